@@ -81,6 +81,8 @@ def _input_options(stage: Stage) -> list[inspect.Parameter]:
         optional = isinstance(declared, Optionally)
         kind = declared.what if isinstance(declared, Optionally) else declared
         text = kind.description if isinstance(kind, External) else f"Artifact {kind.kind}: {kind.description}"
+        if not isinstance(kind, External) and kind.outside:
+            text += f"; or a file like {kind.outside} of one's own"
         flag = "--" + role.replace("_", "-")
         optional = optional or role == stage.argument
         annotation = Optional[Path] if optional else Path  # noqa: UP045
@@ -200,7 +202,7 @@ def make_command(stage: Stage) -> Callable[..., int]:
         parameters = parameters_for(stage, given_flags(options), config, str(options["config"]))
         if options.get("argument") is not None:
             if options[f"input_{stage.argument}"] is not None:
-                raise UsageError(f"{stage.name}: {stage.argument} is given twice", hint="see --help")
+                raise UsageError(f"{stage.name}: {stage.argument} is given twice", hint="give it once")
             options[f"input_{stage.argument}"] = options["argument"]
         inputs = {role: path for role in stage.reads if (path := options[f"input_{role}"]) is not None}
         result = run_stage(

@@ -24,7 +24,7 @@ def timeline(
     if grown is None:
         raise BadInput(
             f"{folder}: the map of this graph kept no snapshots",
-            hint="run `scenewright fuse` with --snapshot-every 20, then `scenewright graph` again",
+            hint="run `scenewright fuse` with --snapshot-every N, then `scenewright graph`; N: at most its frames",
         )
     if json_output:
         out(grown.model_dump_json())

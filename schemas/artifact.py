@@ -71,6 +71,9 @@ class Artifact:
     """Payload JSON files that every artifact of this kind holds, with their models: its documents."""
     optional_json_files: ClassVar[dict[str, type[Model]]] = {}
     """Payload JSON files that an artifact of this kind may hold."""
+    outside: ClassVar[str] = ""
+    """Payload file that others write too: a folder that holds it and no manifest, or the file alone, is read in place
+    of an artifact of this kind."""
     undigested: ClassVar[tuple[str, ...]] = ("timings.json",)
     """Payload files that hold wall-clock figures and therefore are in no digest."""
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 from pydantic import Field, model_validator
 from scenewright.schemas.artifact import Artifact, Document
 from scenewright.schemas.base import Model, Vector3
-from scenewright.schemas.cutting_demonstrations import CuttingPlane, PieceNumber
+from scenewright.schemas.cutting_demonstrations import CategoryName, CuttingPlane, PieceNumber
 from scenewright.schemas.plan import Failure
 
 
@@ -38,6 +38,18 @@ class PlannedCut(Model):
     """About the overlap that this piece's fragments were expected to reach with what is wanted."""
 
 
+class WordMet(Model):
+    """How many fragments are what a word of the goal says, by their shape."""
+
+    name: CategoryName
+    wanted: int = Field(ge=1)
+    made: int = Field(ge=0)
+    """Fragments that are what the word says."""
+    evenness: float = Field(ge=1.0)
+    """The largest over the smallest, of one thing: thickness of slices, volume of everything else."""
+    said: str
+
+
 class CuttingScores(Model):
     """How the fragments match those of the goal."""
 
@@ -65,8 +77,10 @@ class CuttingPlanFile(Model):
     stopped: Failure | None
     scores: CuttingScores | None
     """None for a goal in words."""
+    words: tuple[WordMet, ...] = ()
+    """Of a goal in words."""
     sure: float | None
-    """Likeness that was expected before the first cut."""
+    """Likeness that was expected before the first cut; None for a goal in words."""
     doubt: float | None = Field(None, ge=0.0, le=1.0)
     """By which share the volumes of the goal may be off, where it was seen on pictures."""
     notes: tuple[str, ...] = ()
@@ -102,6 +116,8 @@ class CuttingTrialFile(Model):
     refusals: tuple[Failure, ...]
     stopped: Failure | None
     scores: CuttingScores | None
+    words: tuple[WordMet, ...] = ()
+    """Of a goal in words."""
     fallen: int = Field(ge=0)
     """Fragments that rolled off the board."""
     missed: int | None = None

@@ -29,6 +29,8 @@ class KitchenPlanFile(Model):
     steps: tuple[KitchenStep, ...]
     missing: Text
     """What was never taught, when that is why there is no plan."""
+    unread: Text = ""
+    """What the sentence of a task lacks; then it was planned for what the task wants besides."""
     statement: Text
 
 
@@ -39,6 +41,19 @@ class KitchenPlan(Artifact):
     description: ClassVar[str] = "a goal in words, tried in the kitchen"
     undigested: ClassVar[tuple[str, ...]] = ("timings.json",)
     info = Document(KitchenPlanFile, "plan.json")
+
+
+class TriedTask(Model):
+    """One task of one's own."""
+
+    name: Name
+    sentence: Text
+    unread: Text
+    """What the sentence lacks; empty: it was understood, as what the task wants."""
+    reached: bool
+    actions: int = Field(ge=0)
+    why: Text
+    """Why it was not reached."""
 
 
 class EvaluatedSet(Model):
@@ -52,6 +67,10 @@ class EvaluatedSet(Model):
     unplanned: int = Field(ge=0)
     """Without a plan, or with a goal that nobody explained."""
     failed_actions: int = Field(ge=0)
+    understood: int | None = Field(default=None, ge=0)
+    """Sentences that mean what the task wants; None where nobody said any."""
+    tried: tuple[TriedTask, ...] = ()
+    """Tasks of one's own."""
 
 
 class KitchenEvaluationFile(Model):

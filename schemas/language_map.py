@@ -98,7 +98,8 @@ class AnswersFile(Model):
 
 class Answers(Artifact):
     """`answers.json`, and `masks.npz`: `gaussians` (K,) int32, those of all answers one after another, `starts`
-    (answers + 1,) int64. Outcome `absent`: nothing is as likely as was asked for."""
+    (answers + 1,) int64. Outcomes where nothing is as likely as was asked for: `absent`, or
+    `unknown` when the encoder never read a word of the text or has learned no such pictures."""
 
     kind: ClassVar[str] = "answers"
     description: ClassVar[str] = "places of a room that fit a text, with probabilities"

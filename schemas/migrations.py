@@ -42,3 +42,9 @@ def sequence_of_several_cameras(old: Path, new: Path) -> None:
     except (KeyError, TypeError):
         raise BadInput(f"{path}: tells no camera and frame_count", hint="make the artifact again") from None
     (new / "sequence.json").write_text(json.dumps(document, sort_keys=True, indent=1) + "\n", encoding="utf-8")
+
+
+@migration("sequence", 2)
+def sequence_without_sources(old: Path, new: Path) -> None:
+    """Version 3 may hold `sources.json` and two more streams; one of version 2 knows none of them."""
+    shutil.copytree(old, new, dirs_exist_ok=True, ignore=shutil.ignore_patterns("manifest.json"))

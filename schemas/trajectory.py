@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import ClassVar, Literal
 
 from scenewright.schemas.artifact import Artifact, OptionalDocument
@@ -18,7 +19,8 @@ class FrameEstimate(Model):
     status: Literal["key", "tracked", "interpolated", "unposed"]
     """Key frames stand in the pose graph; tracked ones hang on one; interpolated ones lie between two neighbours."""
     fault: str = ""
-    """Why it has no pose (`no_depth`, `not_joined`, `not_registered`), or `lost`: tracking began anew here."""
+    """Why it has no pose (`no_depth`, `not_joined`, `not_registered`, `contradicted`), or `lost`: tracking began anew
+    here."""
     confidence: float = 0.0
     """How well it agrees with what it was aligned with, 0 to 1."""
     uncertainty: float | None = None
@@ -67,9 +69,15 @@ class PosesFile(Model):
 class Trajectory(Artifact):
     """`trajectory.tum`: one line a frame, `t tx ty tz qx qy qz qw`, world_from_camera.
 
-    Estimated ones have `poses.json`; a trajectory from elsewhere need not.
+    Estimated ones have `poses.json`; a trajectory from elsewhere, which is a folder with `trajectory.tum` alone or the
+    file itself, has none, and its world is nobody's (stages/kit/own_trajectory.py).
     """
 
+    outside: ClassVar[str] = "trajectory.tum"
     kind: ClassVar[str] = "trajectory"
     description: ClassVar[str] = "camera trajectory (TUM format, world_from_camera)"
     info = OptionalDocument(PosesFile, "poses.json")
+
+    def path(self, name: str) -> Path:
+        """Return the path of a payload file; the file itself where it was given alone."""
+        return self.root if name == self.outside and self.root.is_file() else super().path(name)

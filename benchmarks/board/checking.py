@@ -1,27 +1,41 @@
 """`python -m benchmarks.board.checking`: one published trial, drawn by the commit, measured again and compared.
 
-Drawn among the cheapest rung of the public rooms, of the newest version, and measured in a worktree of its commit. If
-this checkout judges by other code than the record says, nothing can be compared, and it says so.
+Drawn among the cheapest rung of the public rooms, of the newest version, and measured in a worktree of its commit, by
+the judge of board 1: where the code that judges has changed since, in a worktree of JUDGE.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenewright.schemas.errors import ScenewrightError, UsageError
+from scenewright.schemas.errors import MachineFailure, ScenewrightError, UsageError
 
-from benchmarks.board.__main__ import say, setting_of
-from benchmarks.board.method import REPOSITORY, Method
+from benchmarks.board.__main__ import say
+from benchmarks.board.method import REPOSITORY, Method, checkout_of
 from benchmarks.board.publishing import read_versions
-from benchmarks.board.records import Line, judge_digest
-from benchmarks.board.rooms import measure_public
+from benchmarks.board.records import Line, judge_digest, read_lines
 
 CHEAPEST = "perfect"
 DIFFERS = 4
+JUDGE = "1cb0dbff"
+"""The commit whose code judged the public, sealed and task records of board 1."""
+ONE_TRIAL = """
+import sys
+from pathlib import Path
+from benchmarks.board.__main__ import setting_of
+from benchmarks.board.records import line_text
+from benchmarks.board.rooms import measure_public
+setting = setting_of(Path(sys.argv[1]), sys.argv[2], keep=False)
+setting.generator.prepare()
+(line,) = measure_public(setting, sys.argv[3], (sys.argv[4],))
+Path(sys.argv[5]).write_text(line_text(line), encoding="utf-8")
+"""
+"""What a judge is asked: folder, method, seed, rung, and the file to write. `make board` has the same doors."""
 
 
 def drawn(lines: Sequence[Line], commit: str) -> Line | None:
@@ -46,6 +60,20 @@ def differing(one: Line, other: Line) -> list[str]:
     return [f"{name}: {first} in the record, {second} now" for name, first, second in pairs if first != second]
 
 
+def measured_again(line: Line, out: Path) -> Line:
+    """Measure a public trial again below `out`, by the code that judged it. Raises ScenewrightError."""
+    judge = REPOSITORY if line.judge == judge_digest() else checkout_of(JUDGE, out / "checkouts")
+    written = out / "again.jsonl"
+    written.parent.mkdir(parents=True, exist_ok=True)
+    written.unlink(missing_ok=True)
+    words = [str(out), line.commit, line.trial.seed, CHEAPEST, str(written)]
+    environment = {**os.environ, "PYTHONPATH": str(judge)}
+    done = subprocess.run([sys.executable, "-P", "-c", ONE_TRIAL, *words], env=environment, cwd=judge, check=False)
+    if done.returncode:
+        raise MachineFailure(f"{line.trial}: measuring it again ended with {done.returncode}", hint="see above")
+    return read_lines(written)[0]
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure one line again; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.board.checking", description=__doc__)
@@ -58,12 +86,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             say("no trial is published yet")
             return 0
         say(f"{commits_since(line.commit)} commits changed the method since {line.commit}, whose figures are published")
-        if line.judge != judge_digest():
-            say(f"{line.trial}: judged by {line.judge}, this checkout judges by {judge_digest()}: nothing to compare")
+        again = measured_again(line, asked.out.resolve())
+        if again.judge != line.judge:
+            say(f"{line.trial}: judged by {line.judge}, {JUDGE} judges by {again.judge}: nothing to compare")
             return 0
-        setting = setting_of(asked.out.resolve(), line.commit, keep=False)
-        setting.generator.prepare()
-        (again,) = measure_public(setting, line.trial.seed, (CHEAPEST,))
     except UsageError as error:  # a clone without history cannot be asked
         say(f"nothing compared: {error}")
         return 0

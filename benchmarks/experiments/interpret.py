@@ -156,11 +156,16 @@ class Known:
         text = domain_text(domain)
 
         def plan(
-            domain: Domain, objects: list[str], atoms: frozenset[Atom], goal: frozenset[Atom], avoided: frozenset[Atom]
+            domain: Domain,
+            objects: list[str],
+            atoms: frozenset[Atom],
+            goal: frozenset[Atom],
+            avoided: frozenset[Atom],
+            longest: int,
         ) -> tuple[TaskPlan, float]:
-            key = (text, tuple(objects), atoms, goal, avoided)
+            key = (text, tuple(objects), atoms, goal, avoided, longest)
             if key not in self.plans:
-                self.plans[key] = timed_plan(domain, objects, atoms, goal, avoided)
+                self.plans[key] = timed_plan(domain, objects, atoms, goal, avoided, longest)
             return self.plans[key]
 
         return plan

@@ -25,7 +25,8 @@ import numpy as np
 from pydantic import Field
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
-from scenewright.stages.kit.formats.frames import CAMERA_FRAME, FrameReader
+from scenewright.stages.kit.formats.frame_streams import CAMERA_FRAME
+from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.rendering.splatting.rasterizer import View
 from scenewright.stages.kit.stage import Parameters

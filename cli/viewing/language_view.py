@@ -48,7 +48,8 @@ def draw_answers(answers: Answers, canvas: Canvas) -> None:
     """Draw the answers as boxes, greener the likelier, and list them."""
     info = answers.info
     lines = [f"# {info.text}", "", "| probability | where | node |", "|---|---|---|"]
-    lines += [_line(answer) for answer in info.answers] or ["| | the room has none | |"]
+    none = "whether the room has one is unknown" if answers.outcome == "unknown" else "the room has none"
+    lines += [_line(answer) for answer in info.answers] or [f"| | {none} | |"]
     if info.unread:
         lines += ["", f"The encoder has never read: {', '.join(info.unread)}"]
     if info.next_best is not None:

@@ -5,6 +5,8 @@ OUTPUTS ?= outputs
 RUN ?= annotated-scan
 FOLDER := $(OUTPUTS)/$(RUN)
 $(if $(SCAN),,$(error annotated-scan needs SCAN=... (labelled mesh or points: a file, or a scene's folder (docs/MASKS.md))))
+UNIT ?= declared
+UP ?= declared
 VOXEL_SIZE ?= 0.02
 SEED ?= 0
 $(if $(SCAN),$(if $(wildcard $(SCAN)),,$(error SCAN=$(SCAN): no such file or folder)))
@@ -13,7 +15,7 @@ $(if $(LABELS),$(if $(wildcard $(LABELS)),,$(error LABELS=$(LABELS): no such fil
 all: $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/panoptic_map/manifest.json: data/pipelines/annotated-scan.toml $(SCAN) $(LABELS)
-	$(PYTHON) -m scenewright fuse --from-mesh '$(SCAN)' $(if $(LABELS),--labels '$(LABELS)') --voxel-size '$(VOXEL_SIZE)' --out $(FOLDER)/panoptic_map
+	$(PYTHON) -m scenewright fuse --from-mesh '$(SCAN)' $(if $(LABELS),--labels '$(LABELS)') --voxel-size '$(VOXEL_SIZE)' --unit '$(UNIT)' --up '$(UP)' --out $(FOLDER)/panoptic_map
 
 $(FOLDER)/contact_graph/manifest.json: data/pipelines/annotated-scan.toml $(FOLDER)/panoptic_map/manifest.json
 	$(PYTHON) -m scenewright graph --panoptic-map $(FOLDER)/panoptic_map --seed '$(SEED)' --out $(FOLDER)/contact_graph

@@ -16,10 +16,10 @@ from scenewright.stages.articulate.joints import Cloud, FoundJoint, find_joints
 from scenewright.stages.articulate.parameters import ArticulateParameters
 from scenewright.stages.articulate.watching import NEAREST, Watched
 from scenewright.stages.kit.formats.frames import FrameReader, require_depth
-from scenewright.stages.kit.formats.trajectories import poses_at, read_tum
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.surface_samples import surface_samples
 from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.kit.own_trajectory import frame_poses
 from scenewright.stages.kit.prefetching import prefetched
 from scenewright.stages.kit.stage import Context, Progress
 from scipy import ndimage
@@ -61,7 +61,7 @@ def run(
     with FrameReader(sequence.path("frames.mcap")) as reader:
         poses = None
         if trajectory is not None:
-            poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
+            poses = frame_poses(trajectory, sequence, reader, parameters.pose_tolerance)
         used = Used(reader, poses, parameters)
         with context.progress.step("watch"):
             grid = grid_of(used, parameters)

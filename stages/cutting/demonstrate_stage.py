@@ -28,7 +28,7 @@ def run(record: Path | None, *, parameters: DemonstrateParameters, context: Cont
         if record is not None:
             recorded, trials = read_recording(record)
             if not trials:
-                raise BadInput(f"{record}: nothing was cut", hint="cut something (scenewright cutting record FILE)")
+                raise BadInput(f"{record}: nothing was cut", hint="cut something: scenewright cutting record FILE")
             records = [each.trial for each in recorded]
         else:
             scatter = Scatter(tilt=parameters.tilt, spacing=parameters.spacing)

@@ -14,6 +14,7 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.stages.cutting.demonstrations.cutter import Demonstration
 from scenewright.stages.cutting.learning import MixtureOfPlanes, layers
 from scenewright.stages.cutting.ours.grammar import Grammar, learn
+from scenewright.stages.cutting.ours.imagining import Wish
 from scenewright.stages.cutting.ours.items import Item, item_of
 from scenewright.stages.cutting.ours.policy import DOUBT, OursPolicy
 from scenewright.stages.cutting.ours.records import grammar_of
@@ -48,12 +49,12 @@ class Learned:
         if method in self.choices:
             return cloning.ChoicePolicy(self.choices[method], goal, seed)
         raise UsageError(
-            f"the model has not learned {method}", hint=f"scenewright cutting learn --methods ours --methods {method}"
+            f"the model has not learned {method}", hint=f"learn it: scenewright cutting learn --methods {method}"
         )
 
-    def policy_for(self, items: Sequence[Item], *, together: bool = False, doubt: float = DOUBT) -> Policy:
-        """Return our policy for items; it needs no bodies."""
-        return OursPolicy(self.grammar, items, together=together, doubt=doubt)
+    def policy_for(self, wanted: Sequence[Item] | Wish, *, together: bool = False, doubt: float = DOUBT) -> Policy:
+        """Return our policy for items, or for words; it needs no bodies."""
+        return OursPolicy(self.grammar, wanted, together=together, doubt=doubt)
 
 
 def learn_methods(

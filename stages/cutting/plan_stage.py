@@ -10,14 +10,21 @@ from PIL import Image
 from scenewright.schemas.base import as_vector
 from scenewright.schemas.cutting_demonstrations import CuttingDemonstrations
 from scenewright.schemas.cutting_model import CuttingModel
-from scenewright.schemas.cutting_plan import CuttingPlan, CuttingPlanFile, CuttingScores, PlannedCut, WantedFragment
+from scenewright.schemas.cutting_plan import (
+    CuttingPlan,
+    CuttingPlanFile,
+    CuttingScores,
+    PlannedCut,
+    WantedFragment,
+    WordMet,
+)
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.cutting.bodies_file import write_bodies
 from scenewright.stages.cutting.demonstrations.records import plane_record, read_demonstrations
 from scenewright.stages.cutting.measure.scores import Scores, score
 from scenewright.stages.cutting.methods import Learned, read_learned
 from scenewright.stages.cutting.ours.grammar import Grammar
-from scenewright.stages.cutting.ours.imagining import imagine
+from scenewright.stages.cutting.ours.imagining import Wish, imagine
 from scenewright.stages.cutting.ours.items import Item, features, item_of
 from scenewright.stages.cutting.ours.policy import DOUBT
 from scenewright.stages.cutting.parameters import PlanParameters
@@ -27,6 +34,7 @@ from scenewright.stages.cutting.policy import Carving, Goal, Step, carry_out
 from scenewright.stages.cutting.sight.pictured import read_pictures
 from scenewright.stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
 from scenewright.stages.cutting.sight.seeing import DOUBT_OF_ONE, see
+from scenewright.stages.cutting.verdict import verdict, words_met
 from scenewright.stages.cutting.words import read_words
 from scenewright.stages.cutting.world.body import Body
 from scenewright.stages.cutting.world.canonical import axis_across, canonical
@@ -47,6 +55,8 @@ class _Task:
     names: list[str]
     said: str
     notes: tuple[str, ...]
+    wish: Wish | None = None
+    """Of words."""
     doubt: float | None = None
     pictures: tuple[np.ndarray, ...] = ()
     """Colour pictures of the goal."""
@@ -66,14 +76,15 @@ def run(
     learned = read_learned(model)
     task = _task(learned, demonstrations, mesh, goal_meshes, goal_pictures, parameters, context)
     if parameters.method == "ours":
-        policy = learned.policy_for(task.items, together=parameters.together, doubt=task.doubt or DOUBT)
+        policy = learned.policy_for(task.wish or task.items, together=parameters.together, doubt=task.doubt or DOUBT)
     else:
         policy = learned.policy(parameters.method, Goal(tuple(task.goal)), context.seed)
     with context.progress.step("plan"):
         carving = carry_out(policy, task.objects, most=_most(parameters.method, task))
-    scores = score(carving.fragments, task.goal) if task.goal else None
-    reached = carving.stopped is None and len(carving.board) >= len(task.items)
-    file = _file(task, carving, learned.grammar, scores, parameters.method, reached)
+    scores = scores_record(score(carving.fragments, task.goal)) if task.goal else None
+    words = words_met(task.wish, carving) if task.wish is not None else ()
+    outcome, said = verdict(carving, len(task.items), scores, words)
+    file = _file(task, carving, learned.grammar, scores, words, parameters.method, said)
     file.write(context.output / "plan.json")
     context.output.joinpath("plan.txt").write_text(plan_text(file), encoding="utf-8")
     write_bodies(context.output / "bodies.npz", [*task.objects, *task.goal, *carving.fragments])
@@ -82,9 +93,9 @@ def run(
     summary: dict[str, object] = {"method": parameters.method, "cuts": len(carving.steps), "wanted": len(task.items)}
     if scores is not None:
         summary["iou"] = round(scores.iou, 3)
-    if not reached:
+    if outcome != "ok":
         summary["reason"] = file.statement
-    return CuttingPlan(root=context.output, outcome="ok" if reached else "not_reached", summary=summary)
+    return CuttingPlan(root=context.output, outcome=outcome, summary=summary)
 
 
 def _most(method: str, task: _Task) -> int:
@@ -130,14 +141,20 @@ def _task(
             SEEN_DOUBT if len(pictures_read) > 1 else DOUBT_OF_ONE,
         )
     if parameters.goal:
-        items, names = imagine(objects, read_words(parameters.goal), learned.grammar)
-    else:
-        items, names = [item_of(body, k) for k, body in enumerate(goal)], [""] * len(goal)
-    return _Task(objects, goal, items, names, goal_text, tuple(notes), doubt, pictures)
+        wish = imagine(objects, read_words(parameters.goal), learned.grammar)
+        return _Task(objects, [], wish.items, list(wish.names), goal_text, tuple(notes), wish)
+    items = [item_of(body, k) for k, body in enumerate(goal)]
+    return _Task(objects, goal, items, [""] * len(goal), goal_text, tuple(notes), None, doubt, pictures)
 
 
 def _file(
-    task: _Task, carving: Carving, grammar: Grammar, scores: Scores | None, method: str, reached: bool
+    task: _Task,
+    carving: Carving,
+    grammar: Grammar,
+    scores: CuttingScores | None,
+    words: tuple[WordMet, ...],
+    method: str,
+    said: list[str],
 ) -> CuttingPlanFile:
     cuts = []
     for step in carving.steps:
@@ -158,11 +175,7 @@ def _file(
         )
     alike = [cut.likeness for cut in cuts if cut.likeness is not None]
     strokes = "" if carving.strokes == len(cuts) else f" in {carving.strokes} strokes"
-    statement = f"{len(cuts)} cuts{strokes} make {len(carving.board)} fragments, {len(task.items)} are wanted"
-    if carving.stopped is not None:
-        statement += f"; stopped: {carving.stopped.message}"
-    elif not reached and carving.refusals:
-        statement += f"; the knife refused: {carving.refusals[-1].message}"
+    counted = f"{len(cuts)} cuts{strokes} make {len(carving.board)} fragments, {len(task.items)} are wanted"
     return CuttingPlanFile(
         method=method,
         goal=task.said,
@@ -175,11 +188,12 @@ def _file(
         cuts=tuple(cuts),
         refusals=tuple(carving.refusals),
         stopped=carving.stopped,
-        scores=None if scores is None else scores_record(scores),
+        scores=scores,
+        words=words,
         sure=float(np.mean(alike[: len(task.objects)])) if alike else None,
         doubt=task.doubt,
         notes=task.notes,
-        statement=statement,
+        statement="; ".join([counted, *said]),
     )
 
 

@@ -13,6 +13,7 @@ from scenewright.stages.cutting.board import Board, laid_out
 from scenewright.stages.cutting.bodies_file import read_bodies, write_bodies
 from scenewright.stages.cutting.measure.scores import score
 from scenewright.stages.cutting.methods import Learned, read_learned
+from scenewright.stages.cutting.ours.imagining import Wish, imagine
 from scenewright.stages.cutting.ours.items import Item
 from scenewright.stages.cutting.ours.policy import DOUBT
 from scenewright.stages.cutting.parameters import SimulateParameters
@@ -24,6 +25,8 @@ from scenewright.stages.cutting.sight.perceiving import PerceivingPolicy
 from scenewright.stages.cutting.sight.pictured import write_pictures
 from scenewright.stages.cutting.sight.seeing import DOUBT as SEEN_DOUBT
 from scenewright.stages.cutting.sight.views import look
+from scenewright.stages.cutting.verdict import verdict, words_met
+from scenewright.stages.cutting.words import read_words
 from scenewright.stages.cutting.world.body import Body
 from scenewright.stages.kit.stage import Context
 
@@ -35,7 +38,9 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
     if len(bodies) < file.objects + file.goal_bodies:
         raise BadInput(f"{plan.root}: has {len(bodies)} bodies, fewer than its objects and goal", hint="plan again")
     objects, goal = laid_out(bodies[: file.objects]), bodies[file.objects : file.objects + file.goal_bodies]
-    policy = _policy(read_learned(model), file, goal, parameters, context.seed)
+    learned = read_learned(model)
+    wish = None if goal else imagine(objects, read_words(file.goal), learned.grammar)
+    policy = _policy(learned, file, goal, wish, parameters, context.seed)
     frames: list[Mapping[int, Body]] = []
     with closing(Hand() if parameters.cameras else Board()) as table, context.progress.step("cut"):
         board = table.board if isinstance(table, Hand) else table
@@ -56,14 +61,15 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
             laid = table.lay_out(carving.fragments)
             write_pictures(context.output / "seen", look(laid, context.random(2)), laid)
     scores = scores_record(score(carving.fragments, goal)) if goal else None
-    reached = carving.stopped is None and len(carving.board) >= len(file.wanted) and not board.fallen
+    words = words_met(wish, carving) if wish is not None else ()
+    outcome, said = verdict(carving, len(file.wanted), scores, words)
     statement = f"{len(carving.steps)} cuts left {len(carving.board)} fragments, {len(file.wanted)} were wanted"
     if board.fallen:
+        outcome = "not_reached"
         statement += f"; {len(board.fallen)} fell off the board"
     if parameters.cameras:
         statement += "; planned from what two depth cameras saw"
-    if carving.stopped is not None:
-        statement += f"; stopped: {carving.stopped.message}"
+    statement = "; ".join([statement, *said])
     CuttingTrialFile(
         method=parameters.method,
         goal=file.goal,
@@ -73,6 +79,7 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
         refusals=tuple(carving.refusals),
         stopped=carving.stopped,
         scores=scores,
+        words=words,
         fallen=len(board.fallen),
         missed=policy.missed if isinstance(policy, PerceivingPolicy) else None,
         turned=float(np.mean(board.turned)) if board.turned else 0.0,
@@ -96,13 +103,18 @@ def run(plan: CuttingPlan, model: CuttingModel, *, parameters: SimulateParameter
     }
     if scores is not None:
         summary["iou"] = round(scores.iou, 3)
-    if not reached:
+    if outcome != "ok":
         summary["reason"] = statement
-    return CuttingTrial(root=context.output, outcome="ok" if reached else "not_reached", summary=summary)
+    return CuttingTrial(root=context.output, outcome=outcome, summary=summary)
 
 
 def _policy(
-    learned: Learned, file: CuttingPlanFile, goal: list[Body], parameters: SimulateParameters, seed: int
+    learned: Learned,
+    file: CuttingPlanFile,
+    goal: list[Body],
+    wish: Wish | None,
+    parameters: SimulateParameters,
+    seed: int,
 ) -> Policy:
     method = parameters.method
     if goal and method != "ours":
@@ -112,4 +124,4 @@ def _policy(
     items = [Item(k, fragment.edges, fragment.volume) for k, fragment in enumerate(file.wanted)]
     if parameters.cameras:
         return PerceivingPolicy(learned.grammar, items, seed, doubt=max(SEEN_DOUBT, file.doubt or 0.0))
-    return learned.policy_for(items, doubt=file.doubt or DOUBT)
+    return learned.policy_for(wish or items, doubt=file.doubt or DOUBT)

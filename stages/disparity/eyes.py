@@ -10,7 +10,7 @@ import numpy as np
 from scenewright.schemas.disparity import RowReport
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
-from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.sequence import OF_TOPICS, Sequence
 from scenewright.stages.disparity.parameters import DisparityParameters
 from scenewright.stages.disparity.rectification import RowCheck, check_rows, matched_features
 from scenewright.stages.disparity.semi_global import gray_of
@@ -41,7 +41,7 @@ def stereo_cameras(reader: FrameReader, sequence: Sequence) -> dict[str, float]:
     if "right" not in reader.streams:
         raise BadInput(
             f"{sequence.root}: its frames have one eye ({', '.join(reader.streams)})",
-            hint="ingest the log with both eyes (--color-topic, --right-topic; left/ and right/ with a calibration)",
+            hint="ingest the log with --color-topic and --right-topic, or folders left/ and right/ with a calibration",
         )
     if "color" not in reader.streams:
         raise BadInput(f"{sequence.root}: its frames have a right eye and no left one", hint="ingest both eyes")
@@ -50,12 +50,12 @@ def stereo_cameras(reader: FrameReader, sequence: Sequence) -> dict[str, float]:
         if not math.isfinite(baseline) or abs(baseline) < SMALLEST_BASELINE:
             raise BadInput(
                 f"{sequence.root}: the eyes of {name!r} have no baseline ({baseline:g} m)",
-                hint="correct P[3] of the right calibration (minus fx times the baseline)",
+                hint="ingest the log again with --baseline METRES",
             )
         if baseline < 0:
             raise BadInput(
                 f"{sequence.root}: left and right of {name!r} are swapped: the baseline is {baseline:g} m",
-                hint="ingest with --color-topic and --right-topic exchanged",
+                hint="ingest the log again, which looks at its pictures",
             )
     return baselines
 
@@ -80,7 +80,9 @@ def check_eyes(
         raise BadInput(
             f"{sequence.root}: left and right of {name!r} are swapped: {100 * rows.negative_share:.0f} % of "
             f"{rows.matches} matched features lie further right in the right picture",
-            hint="exchange the two eyes (--color-topic and --right-topic, or the folders left/ and right/)",
+            hint="ingest the log again with the topics of --color-topic and --right-topic exchanged"
+            if sequence.info.source_format in OF_TOPICS
+            else "put the pictures of the left eye in the place of those of the right one, and ingest the log again",
         )
     if rows.checked and abs(rows.median_disparity) < NO_PARALLAX:
         logger.warning(
@@ -150,5 +152,5 @@ def _tell(
             f"fy {camera.fy:.0f} px)"
         )
         if parameters.rectification == "refuse":
-            raise BadInput(message, hint="calibrate the pair again, or --rectification correct")
+            raise BadInput(message, hint="calibrate the pair again, or give --rectification correct")
         logger.warning("%s", message)

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 from scenewright.schemas.disparity import Disparity, DisparityFile, FrameDisparity, RowReport
-from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Sequence, SequenceFile
 from scenewright.stages.disparity import semi_global
 from scenewright.stages.disparity.eyes import check_eyes, is_blank, stereo_cameras
@@ -44,8 +43,6 @@ def run(sequence: Sequence, weights: Path | None, *, parameters: DisparityParame
     The outcome is `not_rectified` when a camera's rows differ and were not put right, `empty` when no frame could be
     matched. Raises BadInput for a sequence with one eye, without a baseline, with swapped eyes.
     """
-    if not sequence.path("frames.mcap").is_file():
-        raise BadInput(f"{sequence.root}: frames.mcap is missing", hint="run `scenewright ingest` again")
     with FrameReader(sequence.path("frames.mcap")) as reader:
         baselines = stereo_cameras(reader, sequence)
         with context.progress.step("check rows"):
@@ -204,6 +201,8 @@ def _finish(
             "color_depth_registered": True,
         }
     ).write(context.output / "sequence.json")
+    if sequence.sources is not None:
+        sequence.sources.of_frames(each.input_frame for each in written.frames).write(context.output / "sources.json")
     DisparityFile(
         method=parameters.method,
         detail=detail,

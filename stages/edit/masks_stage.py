@@ -12,11 +12,13 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.segments import FrameSegment, FrameSegments, Segments, SegmentsFile
 from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.edit.map_state import MapState, read_state
 from scenewright.stages.edit.parameters import EditMasksParameters
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
 from scenewright.stages.kit.formats.masks import write_panoptic_zip
+from scenewright.stages.kit.formats.trajectories import poses_at, read_tum
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.stage import Context
@@ -27,13 +29,19 @@ LARGEST_ID = 0xFFFFFF
 
 
 def run(
-    sequence: Sequence, panoptic_map: PanopticMap, *, parameters: EditMasksParameters, context: Context
+    sequence: Sequence,
+    panoptic_map: PanopticMap,
+    trajectory: Trajectory | None = None,
+    *,
+    parameters: EditMasksParameters,
+    context: Context,
 ) -> Segments:
     """Draw what each frame sees of the things of the map, and write it as `segment` writes masks.
 
     A pixel with depth is of the thing whose surface is nearest to its point, within `reach`; one without, of the thing
     that its ray meets first. So is every pixel whose ray meets a thing that a person drew (`edit add --drawn`: glass)
-    before what the camera measured. Frames without a pose are left out. Raises BadInput when no frame has one.
+    before what the camera measured. Frames without a pose, in `trajectory` where one is given, are left out. Raises
+    BadInput when no frame has one.
     """
     state, map_info = read_state(panoptic_map)
     turned = np.eye(4) if map_info.world_from_sequence is None else np.array(map_info.world_from_sequence)
@@ -42,13 +50,17 @@ def run(
     info, caster = sequence.info, _RayCaster(state)
     annotations: list[FrameSegments] = []
     with FrameReader(sequence.path("frames.mcap")) as reader:
+        poses = None
+        if trajectory is not None:
+            poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
 
         def images() -> Iterator[tuple[int, np.ndarray]]:
             frames = reader.frames(streams=("depth",))
             for frame in context.progress.track(frames, total=len(reader), description="draw masks"):
-                if frame.world_from_camera is None:
+                pose = frame.world_from_camera if poses is None else poses[frame.index]
+                if pose is None:
                     continue
-                frame = replace(frame, world_from_camera=turned @ frame.world_from_camera)
+                frame = replace(frame, world_from_camera=turned @ pose)
                 ids = frame_ids(frame, reader.cameras[frame.camera_name], state, caster, parameters.reach)
                 annotations.append(FrameSegments(frame=frame.index, segments=_segments(ids, state)))
                 yield frame.index, ids
@@ -56,7 +68,7 @@ def run(
         with context.progress.step("draw the masks"):
             write_panoptic_zip(context.output / "panoptic.zip", images())
     if not annotations:
-        raise BadInput(f"{sequence.root}: no frame has a pose", hint="`scenewright poses` finds them")
+        raise BadInput(f"{sequence.root}: no frame has a pose", hint="give the --trajectory that the map was made with")
     SegmentsFile(
         backend="map", label=LABEL, width=info.camera.width, height=info.camera.height, frames=tuple(annotations)
     ).write(context.output / "segments.json")

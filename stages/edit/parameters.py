@@ -9,6 +9,7 @@ from scenewright.schemas.contact_graph import ContactGraph
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.segments import Segments
 from scenewright.schemas.sequence import Sequence
+from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 
@@ -53,6 +54,9 @@ class EditMasksParameters(Parameters):
 
     reach: float = Field(
         0.04, gt=0, le=1, description="A pixel is of the thing whose surface is nearest to its point, within this [m]"
+    )
+    pose_tolerance: float = Field(
+        0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
     )
 
 
@@ -101,7 +105,7 @@ MASKS = Stage(
     name="edit masks",
     summary="Draw masks for every frame from a map that was put right, to train with (`export --layout coco`)",
     parameters=EditMasksParameters,
-    reads={"sequence": Sequence, "panoptic_map": PanopticMap},
+    reads={"sequence": Sequence, "panoptic_map": PanopticMap, "trajectory": Optionally(Trajectory)},
     writes=Segments,
     libraries=("numpy", "scipy", "open3d"),
     module="masks_stage",

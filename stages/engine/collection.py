@@ -240,7 +240,7 @@ def _classify(
             reason = f"read by {readers}; making it took {manifest.provenance.seconds:.1f} s"
             item = replace(item, category="intermediate", reason=reason, collectable=intermediate)
     if item.collectable and manifest.kind in keep:
-        return replace(item, collectable=False, reason=f"kept (--keep {manifest.kind}); {item.reason}")
+        return replace(item, collectable=False, reason=f"stays as asked; {item.reason}")
     if item.collectable and is_locked(path):
         return replace(item, collectable=False, reason="a run is writing it now")
     return item

@@ -78,10 +78,18 @@ class _Watch:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; a signal that is still under way raises nothing any more."""
+        """End the thread; a signal that is still under way raises nothing any more. What was quicker than the first
+        look is looked at now."""
         self.armed = False
         self._ended.set()
         self._thread.join()
+        self._note(resident_memory_bytes())
+
+    def _note(self, used: int) -> bool:
+        """Return whether memory in use is over the limit, and remember the most."""
+        over = used > self.limit
+        self.most = max(self.most, used) if over else self.most
+        return over
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
         """Signal handler. Raises _LimitReached."""
@@ -100,8 +108,7 @@ class _Watch:
         next_signal = 0.0
         while not self._ended.wait(SECONDS_BETWEEN_LOOKS):
             used, now = resident_memory_bytes(), time.monotonic()
-            if used > self.limit:
-                self.most = max(self.most, used)
+            if self._note(used):
                 reached = now if reached is None else reached
             if reached is None:
                 continue

@@ -105,12 +105,28 @@ def check_hashes(root: Path, manifest: Manifest) -> None:
             )
 
 
+def open_outside(root: Path, kind: type[Artifact]) -> Artifact | None:
+    """Return a handle without manifest where `root` is what others write in place of an artifact of `kind`: a file, or
+    a folder that holds such a file and no manifest. None for anything else."""
+    root = Path(root)
+    try:
+        lone = root.is_file() or ((root / kind.outside).is_file() and not (root / MANIFEST_NAME).exists())
+    except (OSError, ValueError):
+        return None
+    return kind(root=root) if kind.outside and lone else None
+
+
 def open_artifact(root: Path, expected: type[Artifact] | None = None) -> Artifact:
     """Open an artifact folder as its typed handle. A subclass of the kind will do: a disparity is a sequence.
 
     Raises BadInput for a wrong kind, version or missing payload.
     """
     root = Path(root)
+    if expected is not None and expected.outside and root.is_dir() and not (root / MANIFEST_NAME).exists():
+        raise BadInput(
+            f"{root}: holds neither an artifact nor {expected.outside}",
+            hint=f"give the folder that a step wrote, or a file like {expected.outside}",
+        )
     manifest = read_manifest(root)
     kind_class = KINDS.get(manifest.kind)
     if expected is not None and kind_class is not None and not issubclass(kind_class, expected):

@@ -26,5 +26,5 @@ def artifacts_of(run: Path) -> dict[str, Path]:
         if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith(".") and is_artifact(entry)
     }
     if not folders:
-        raise BadInput(f"{run}: holds no artifacts", hint="give the --out of `scenewright run`, or an artifact folder")
+        raise BadInput(f"{run}: holds no artifacts", hint="give the --out of `scenewright run`")
     return folders

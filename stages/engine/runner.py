@@ -25,7 +25,7 @@ from scenewright.stages.engine.keys import artifact_key, data_file_digests, libr
 from scenewright.stages.engine.machine_faults import MACHINE_ERRORS, OUT_OF_MEMORY, first_cause
 from scenewright.stages.engine.model_cache import resolve_weights, with_usual_models
 from scenewright.stages.engine.provenance import processor_seconds, provenance_now
-from scenewright.stages.engine.reading import check_hashes, check_sizes, open_artifact, read_manifest
+from scenewright.stages.engine.reading import check_hashes, check_sizes, open_artifact, open_outside, read_manifest
 from scenewright.stages.kit.digests import external_digest, external_files
 from scenewright.stages.kit.estimates import Estimate
 from scenewright.stages.kit.progress import SilentProgress, showing
@@ -96,9 +96,10 @@ class _OpenInput:
 
     def was_written(self) -> bool:
         """Whether it holds something else than when it was opened."""
-        if _stamp(self.path, isinstance(self.value, Artifact)) == self.stamp:
+        is_artifact = isinstance(self.value, Artifact) and self.value.manifest is not None
+        if _stamp(self.path, is_artifact) == self.stamp:
             return False
-        if not isinstance(self.value, Artifact):
+        if not is_artifact:
             return True
         found = _previous_manifest(self.path)
         return found is None or found.content_digest != self.digest
@@ -180,7 +181,11 @@ def _open_inputs(stage: Stage, paths: Mapping[str, Path]) -> list[_OpenInput]:
         _check_name(path, f"--{role.replace('_', '-')}")
         declared = stage.reads[role]
         what = declared.what if isinstance(declared, Optionally) else declared
-        if isinstance(what, External):
+        outside = None if isinstance(what, External) else open_outside(path, what)
+        if outside is not None:
+            stamp = _stamp(Path(path), False)
+            opened.append(_OpenInput(role, "external", external_digest(path), Path(path), outside, stamp))
+        elif isinstance(what, External):
             path = resolve_weights(path) if what.weights else path
             stamp = _stamp(Path(path), False)
             opened.append(_OpenInput(role, "external", external_digest(path), Path(path), Path(path), stamp))

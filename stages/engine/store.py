@@ -150,7 +150,7 @@ def locked(target: Path) -> Iterator[None]:
         descriptor = os.open(_beside(target, "lock"), os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
         reason = "a file stands in its path" if isinstance(error, NotADirectoryError | FileExistsError) else ""
-        raise MachineFailure(f"{target}: {reason or error.strerror}", hint="choose a writable --out") from None
+        raise MachineFailure(f"{target}: {reason or error.strerror}", hint="choose another --out") from None
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -208,7 +208,7 @@ def partial_folder(target: Path) -> Iterator[Path]:
         try:
             partial.mkdir()
         except OSError as error:
-            raise MachineFailure(f"{target}: {error.strerror}", hint="choose a writable --out") from None
+            raise MachineFailure(f"{target}: {error.strerror}", hint="choose another --out") from None
         yield partial
     finally:
         shutil.rmtree(partial, ignore_errors=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -38,7 +39,7 @@ from scenewright.stages.evaluate.results import Part
 from scenewright.stages.evaluate.shape_loading import true_shapes
 from scenewright.stages.evaluate.trajectory_measures import count_poses, measure_trajectory
 from scenewright.stages.evaluate.truth import TrueRoom, load_truth
-from scenewright.stages.kit.formats.trajectories import read_tum
+from scenewright.stages.kit.formats.trajectories import read_stamped_rows, read_tum
 from scenewright.stages.kit.measurement.tables import write_table
 from scenewright.stages.kit.stage import Context
 
@@ -333,7 +334,14 @@ def _trajectory(artifact: Trajectory | Sequence | None) -> tuple[np.ndarray, np.
         return None
     if isinstance(artifact, Sequence) and "pose" not in artifact.info.streams:
         return None
-    times, poses = read_tum(artifact.path("trajectory.tum"))
+    if artifact.manifest is None and isinstance(artifact, Trajectory):
+        rows = read_stamped_rows(artifact.path("trajectory.tum"))
+        for note in rows.notes:
+            logging.getLogger("scenewright").warning("%s", note)
+        stamps, order = np.unique(rows.stamps, return_index=True)
+        times, poses = stamps * 1e-9, rows.poses[order]
+    else:
+        times, poses = read_tum(artifact.path("trajectory.tum"))
     return (times, poses) if len(times) else None
 
 

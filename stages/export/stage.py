@@ -46,7 +46,7 @@ def run(
         job = ExportJob(context.output, frames, cameras, info, reader.world_up, tally)
         importlib.import_module(target_format.module).write(job)
         frames_in_sequence = len(reader)
-    notes = _notes(info, cameras, streams, target_format, tally)
+    notes = _notes(info, cameras, parameters.camera is not None, streams, target_format, tally)
     if target_format.masks:
         notes = (f"masks: {'the labels of the log' if segments is None else segments.info.label}", *notes[1:])
         if not tally.masks:
@@ -85,11 +85,12 @@ def chosen_cameras(info: SequenceFile, wanted: str | None, target_format: Sequen
 def _notes(
     info: SequenceFile,
     cameras: Mapping[str, Camera],
+    chosen: bool,
     streams: tuple[str, ...],
     target_format: SequenceFormat,
     tally: Tally,
 ) -> tuple[str, ...]:
-    """What a reader of the export has to know."""
+    """What a reader of the export has to know; `chosen`: whether a camera was asked for."""
     notes = [f"{WORLD_NOTE}, {target_format.pose_note}" if target_format.pose_note else WORLD_NOTE]
     if info.gravity.method == "none":
         notes[0] = notes[0].replace("z up", "as the log had it")
@@ -98,7 +99,8 @@ def _notes(
         notes.append(f"not written: {', '.join(lost)}")
     others = [camera.name for camera in info.cameras if camera.name not in cameras]
     if others:
-        notes.append(f"cameras not written: {', '.join(others)} (--camera NAME writes another one)")
+        written = f"cameras not written: {', '.join(others)}"
+        notes.append(written if chosen else f"{written} (--camera NAME writes another one)")
     if tally.depth_pixels_zeroed:
         notes.append(
             f"{tally.depth_pixels_zeroed} depth pixels beyond {target_format.depth_limit:g} m are 0 = invalid: "

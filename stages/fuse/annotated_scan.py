@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,10 @@ import trimesh
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_text
 from scenewright.stages.fuse.parts import connected_parts
-from scenewright.stages.kit.formats.mesh_files import read_mesh
+from scenewright.stages.kit.formats.mesh_files import read_cloud, read_mesh
 from scenewright.stages.kit.formats.numpy_files import read_all_arrays, read_arrays
 from scenewright.stages.kit.formats.scenenn_annotation import read_annotation
+from scenewright.stages.kit.known_names import AxisName
 
 LARGEST_JSON = 2**28
 """Most bytes of a JSON file."""
@@ -27,6 +28,8 @@ MOST_FACES = 30_000_000
 """Most faces of a scan; a guard against what does not fit into memory, by eye."""
 MOST_POINTS = 20_000_000
 """Most points of a scan without faces; a guard against what does not fit into memory, by eye."""
+BARE = (".ply", ".obj", ".stl", ".glb")
+"""Meshes that are read without labels."""
 HINT = "docs/MASKS.md lists the layouts of labelled meshes"
 NYU40 = (
     "wall",
@@ -87,6 +90,8 @@ class AnnotatedScan:
     """Label -> what its annotators call it; a label without a name is not in it."""
     are_instances: bool
     """Whether a label is one thing; else it is a class, and its things are what hangs together."""
+    up: AxisName = "+z"
+    """Axis that the format of the file has up."""
 
 
 def read_scan(root: Path) -> AnnotatedScan:
@@ -100,6 +105,10 @@ def read_scan(root: Path) -> AnnotatedScan:
         if scan is not None:
             break
     else:
+        meshes = sorted({file.name for file in files if file.suffix.lower() in BARE})
+        if len(meshes) > 1:
+            several = f"{root}: {len(meshes)} meshes without labels, {', '.join(meshes[:3])}"
+            raise BadInput(several, hint="name one of them: --from-mesh FILE")
         raise BadInput(f"{root}: no labelled mesh or points that are read here", hint=HINT)
     if len(scan.faces) > MOST_FACES or len(scan.vertices) > max(MOST_POINTS, 3 * MOST_FACES):
         raise BadInput(
@@ -215,6 +224,13 @@ def _labelled_ply(files: list[Path]) -> AnnotatedScan | None:
     """A PLY whose vertices have `label`: `.labels.ply` of ScanNet (NYU40), or numbers that --labels names."""
     plys = sorted((f for f in files if f.suffix == ".ply"), key=lambda f: (not f.name.endswith(".labels.ply"), f.name))
     for file in plys:
+        if (cloud := read_cloud(file, hint=HINT)) is not None:
+            if cloud.labelled:
+                raise BadInput(
+                    f"{file}: points with labels and without faces do not say which of them are one thing",
+                    hint="write an NPZ: points, instance, id, classes (docs/MASKS.md)",
+                )
+            continue
         mesh, columns, _ = _read(file)
         if "label" in columns:
             is_nyu = file.name.endswith(".labels.ply")
@@ -254,12 +270,17 @@ def _points(files: list[Path]) -> AnnotatedScan | None:
 
 
 def _bare(files: list[Path]) -> AnnotatedScan | None:
-    """One PLY whose vertices have no labels."""
-    plys = [file for file in files if file.suffix == ".ply"]
-    if len(plys) != 1:
+    """One mesh whose vertices have no labels, or a PLY of points alone."""
+    meshes = [file for file in files if file.suffix.lower() in BARE]
+    if len(meshes) != 1:
         return None
-    mesh = read_mesh(plys[0], hint=HINT)
-    return _scan("mesh", mesh, np.zeros(len(mesh.vertices), np.int64), {}, False)
+    file = meshes[0]
+    if file.suffix.lower() == ".ply" and (cloud := read_cloud(file, hint=HINT)) is not None:
+        none, unlabelled = np.zeros((0, 3), dtype=np.int64), np.zeros(len(cloud.points), np.int64)
+        return AnnotatedScan("points", cloud.points, none, cloud.colors, unlabelled, {}, False)
+    mesh = read_mesh(file, hint=HINT)
+    scan = _scan("mesh", mesh, np.zeros(len(mesh.vertices), np.int64), {}, False)
+    return replace(scan, up="+y") if file.suffix.lower() == ".glb" else scan
 
 
 LAYOUTS: tuple[Callable[[list[Path]], AnnotatedScan | None], ...] = (

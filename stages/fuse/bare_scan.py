@@ -1,4 +1,4 @@
-"""A scan that nobody labelled: floor, walls, ceiling and pieces by geometry alone. z is taken to be up."""
+"""A scan that nobody labelled: floor, walls, ceiling and pieces by geometry alone. z is up."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ def told_apart(scan: AnnotatedScan, voxel: float, minimum_area: float, where: Pa
     normals = vertex_normals(points, scan.faces)[first] if len(scan.faces) else _into_the_room(middles)
     floor_height = _floor_height(middles[np.abs(normals[:, 2]) > LEVEL, 2], LEAST_FLOOR / edge**2)
     if floor_height is None:
-        raise BadInput(f"{where}: nothing of it is labelled, and no floor is seen", hint="label it, or turn z up")
+        raise BadInput(
+            f"{where}: nothing of it is labelled, and no floor is seen",
+            hint="label it, or say which axis is up (--up AXIS) and in which unit it is (--unit UNIT)",
+        )
     middles = middles - [0.0, 0.0, floor_height]
     height, level = middles[:, 2], np.abs(normals[:, 2]) > LEVEL
     floor = height < FLOOR

@@ -15,6 +15,7 @@ from scenewright.stages.fuse.annotated_scan import AnnotatedScan, instances_by_c
 from scenewright.stages.fuse.bare_scan import told_apart
 from scenewright.stages.fuse.parameters import FuseParameters
 from scenewright.stages.fuse.point_surface import thinned, tiles_of_points
+from scenewright.stages.fuse.scan_frame import in_metres_and_upright
 from scenewright.stages.kit.formats.map_files import cut_mesh, face_labels, mesh_name, write_arrays
 from scenewright.stages.kit.formats.ply_files import ColoredMesh, canonical_order, write_ply
 from scenewright.stages.kit.labels import ANYTHING, OWN, Label, LabelSet, load_label_set, plain, read_label_file
@@ -42,10 +43,12 @@ def run_from_mesh(scan: Path, labels: Path | None, *, parameters: FuseParameters
     broken, or nothing says what its labels are.
     """
     with context.progress.step("read the scan"):
-        labelled_scan = read_scan(scan)
+        labelled_scan = in_metres_and_upright(read_scan(scan), parameters.unit, parameters.up, scan, context.logger)
         bare = not (labelled_scan.labels > 0).any()
         if bare:
-            context.logger.warning("%s: nothing of it is labelled: things are told apart by geometry, z is up", scan)
+            axis = labelled_scan.up if parameters.up == "declared" else parameters.up
+            geometry = "things are told apart by geometry"
+            context.logger.warning("%s: nothing of it is labelled: %s, %s is up (--up AXIS)", scan, geometry, axis)
             labelled_scan = told_apart(labelled_scan, parameters.voxel_size, parameters.unnamed_area, scan)
         label_set = read_label_file(labels) if labels is not None else None
         table = classes_of(labelled_scan, label_set, scan)
@@ -188,7 +191,7 @@ def upright(
     floor = [k for k, c in class_of.items() if c == vocabulary.by_name("floor").id]
     ground = vertices[np.isin(instance, floor)].astype(float)
     if len(ground) < SMALLEST_FLOOR:
-        context.logger.warning("no floor is annotated: z is taken to be up")
+        context.logger.warning("no floor is annotated: z is taken to be up (--up AXIS)")
         return vertices
     middle = np.median(ground, axis=0)
     normal = np.linalg.svd(ground[:: max(1, len(ground) // 20000)] - middle, full_matrices=False)[2][2]

@@ -13,6 +13,7 @@ from scenewright.schemas.segments import Segments
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.estimates import Estimate, Inputs
+from scenewright.stages.kit.known_names import AxisName, UnitName
 from scenewright.stages.kit.labels import LABEL_TABLES
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
@@ -114,6 +115,12 @@ class FuseParameters(Parameters):
         description="`ours`: surface that no mask named, stands free of walls and has this area is an `object` in one "
         "piece [m^2] (0: it stays surroundings)",
     )
+    unit: Literal["declared", UnitName] = Field(
+        "declared", description="Unit of the file of --from-mesh, whatever it declares (a scan declares none: metres)"
+    )
+    up: Literal["declared", AxisName] = Field(
+        "declared", description="Axis of --from-mesh that points up, whatever its file declares (GLB: +y; others: +z)"
+    )
     part_distance: float = Field(
         0.2, gt=0, description="Parts of a thing farther than this from its largest part are left unlabelled [m]"
     )
@@ -131,6 +138,8 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
     missing = [role for role in ("sequence", "segments") if role not in inputs and "from_mesh" not in inputs]
     if missing:
         raise UsageError(f"fuse: --{missing[0]} is missing", hint="see --help")
+    if "from_mesh" not in inputs and (parameters.unit, parameters.up) != ("declared", "declared"):
+        raise UsageError("--unit and --up are those of --from-mesh", hint="frames: ingest --gravity given --up AXIS")
     if "labels" in inputs and "from_mesh" not in inputs:
         raise UsageError("--labels names the labels of --from-mesh", hint="give the scan too")
 

@@ -28,7 +28,7 @@ from scenewright.stages.fuse.separate import Separate
 from scenewright.stages.fuse.thesis import Thesis
 from scenewright.stages.kit.formats.frames import Frame, FrameReader, require_depth
 from scenewright.stages.kit.formats.masks import PanopticReader
-from scenewright.stages.kit.formats.trajectories import poses_at, read_tum
+from scenewright.stages.kit.own_trajectory import frame_poses
 from scenewright.stages.kit.prefetching import prefetched
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
@@ -129,7 +129,7 @@ def _integrate_frames(
         del info  # the parsed file goes before the map grows
         poses = None
         if trajectory is not None:
-            poses = poses_at(reader.times, *read_tum(trajectory.path("trajectory.tum")), parameters.pose_tolerance)
+            poses = frame_poses(trajectory, sequence, reader, parameters.pose_tolerance)
         cameras = reader.cameras
 
         def read() -> Iterator[tuple[Frame, np.ndarray | None, np.ndarray | None]]:

@@ -7,10 +7,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from scenewright.schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput, UsageError
+from scenewright.schemas.sequence import OF_TOPICS
+from scenewright.stages.ingest.eye_order import settled_eyes
+from scenewright.stages.ingest.foreign import refuse_foreign_file, refuse_foreign_folder, refuse_lone_recording
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.registry import LogLayout, all_layouts
 from scenewright.stages.ingest.source import LogSource
+
+OF_ANY_IMAGES = "images"
+"""The layout that matches any folder with images, and so those of other tools."""
+
+TOPICS = ("color_topic", "depth_topic", "right_topic", "pose_topic")
 
 
 class LogFormat(NamedTuple):
@@ -28,21 +36,43 @@ def log_format(layout: LogLayout) -> LogFormat:
 
 
 def open_log(path: Path, parameters: IngestParameters) -> LogSource:
-    """Recognise a log and list its frames. Raises BadInput when it is missing, of no known format, or damaged."""
+    """Recognise a log and list its frames. Raises BadInput when it is missing, of no known format, or damaged,
+    and for a stereo pair whose pictures are exchanged."""
     if not path.exists():
         raise BadInput(f"{path}: there is no such log", hint="check the path")
     layouts = [layout for layout in all_layouts() if parameters.format in ("auto", layout.name)]
+    guessed = parameters.format == "auto"
+    if guessed and path.is_file():
+        refuse_foreign_file(path)
     for layout in layouts:
         reader = log_format(layout)
         rule = reader.matches(path)
+        if rule is not None and guessed and layout.name == OF_ANY_IMAGES:
+            refuse_foreign_folder(path)
         if rule is not None:
-            return reader.open_source(path, parameters, rule)
+            _check_topics(layout, parameters, path)
+            source = reader.open_source(path, parameters, rule)
+            try:
+                return settled_eyes(source, str(path))
+            except BaseException:
+                source.close()
+                raise
+    if path.is_dir():
+        refuse_foreign_folder(path)
+        refuse_lone_recording(path)
     names = ", ".join(layout.name for layout in layouts)
     kind = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
     raise BadInput(
         f"{path}: is not a log in a format that is known ({names}); it is {kind}",
         hint="docs/LOGS.md describes the layouts",
     )
+
+
+def _check_topics(layout: LogLayout, parameters: IngestParameters, path: Path) -> None:
+    given = [name for name in TOPICS if getattr(parameters, name) is not None]
+    if given and layout.name not in OF_TOPICS:
+        option = f"--{given[0].replace('_', '-')}"
+        raise UsageError(f"{path}: {option} is for logs with topics, not for {layout.name}", hint="leave it out")
 
 
 def _listing(path: Path) -> str:

@@ -10,12 +10,13 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.pose_convention_names import PoseConvention
 from scenewright.stages.ingest.registry import all_layouts
 from scenewright.stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
-from scenewright.stages.kit.stage import External, Parameters, Stage
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 if TYPE_CHECKING:
     LogFormatName = str
 else:
     LogFormatName = Literal["auto", *(layout.name for layout in all_layouts())]
+DepthBits = Literal["as-is", "swapped", "rotated"]
 
 
 class IngestParameters(Parameters):
@@ -30,6 +31,10 @@ class IngestParameters(Parameters):
     cy: float | None = Field(None, description="Principal point y [pixel], overrides the log")
     depth_scale: float | None = Field(
         None, gt=0, description="Depth units per metre, overrides the format's (1000 is millimetres, TUM has 5000)"
+    )
+    depth_bits: DepthBits = Field(
+        "as-is",
+        description="How 16-bit depth is stored: as it is, two bytes exchanged, or bits rotated by three (SUN3D)",
     )
     frame_rate: float = Field(30.0, gt=0, description="Rate assumed for folders whose images carry no time [1/s]")
     every: int = Field(1, ge=1, description="Use every n-th frame of the log")
@@ -54,6 +59,12 @@ class IngestParameters(Parameters):
         "measured, else the mean camera up; given takes the axis named by up",
     )
     up: Literal["x", "-x", "y", "-y", "z", "-z"] = Field("z", description="Up axis of the log's world, with given")
+    baseline: float | None = Field(
+        None,
+        gt=0,
+        le=10,
+        description="Distance of the right eye along +x [m], whatever a calibration says of its sign and unit",
+    )
     camera: tuple[str, ...] = Field(
         (), description="Camera of the log to use, by name, for logs with several; 'all' takes every one"
     )
@@ -108,7 +119,10 @@ STAGE = Stage(
     name="ingest",
     summary="Turn a camera log into a sequence: calibrated, posed, gravity-aligned frames",
     parameters=IngestParameters,
-    reads={"log": External("log: a file (MCAP, bag) or a folder")},
+    reads={
+        "log": External("log: a file (MCAP, bag) or a folder"),
+        "trajectory": Optionally(External("Own poses instead of the log's: lines `t tx ty tz qx qy qz qw` (TUM)")),
+    },
     writes=Sequence,
     libraries=(
         "numpy",

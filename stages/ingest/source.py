@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,14 @@ class Unusable(Exception):
         super().__init__(f"{reason}: {detail}" if detail else reason)
         self.reason = reason
         self.detail = detail
+
+
+@dataclass(frozen=True)
+class FrameFiles:
+    """The files of one frame. None is a file that is missing, or a log that has none."""
+
+    color: Path | None = None
+    depth: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -47,9 +56,12 @@ class SourceCamera:
     """`camera` where a log has one; else unique in the log, of letters, digits and underscores."""
     camera: Camera
     baseline: float | None = None
-    """Distance of the right eye along +x [m], when frames have a right image."""
+    """Distance of the right eye along +x [m], when frames have a right image; negative where a calibration says that
+    it is the left one, until `settled_eyes` has looked at the pictures."""
     registered: bool = True
     """Whether depth pixels and colour pixels see the same ray, as far as the log says."""
+    eyes: tuple[str, str] = ("left", "right")
+    """What the two eyes are called in the log: topics, or folders."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +78,9 @@ class Entry:
     problem: str | None = None
     """Reason for which the frame is known to be unusable without loading it."""
     camera_name: str = "camera"
+    files: FrameFiles = FrameFiles()
+    stamp: int | None = None
+    """Time of its picture as the log states it, of its depth where there is none [ns]."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +124,8 @@ class LogSource:
     streams: tuple[StreamInfo, ...] = ()
     other_cameras: tuple[str, ...] = ()
     """Cameras of the log that were not asked for."""
+    missing: Mapping[str, str] = field(default_factory=dict)
+    """Stream (`depth`, `pose`) that the log lacks -> why, where it holds something of the kind."""
     close: Callable[[], None] = field(default=lambda: None)
 
     @property

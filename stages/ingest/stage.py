@@ -6,22 +6,27 @@ from collections import Counter
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import cv2
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile
+from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile, StreamName
 from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.images import depth_roughness
+from scenewright.stages.ingest.losses import ADVICE
+from scenewright.stages.ingest.origins import named_sources
+from scenewright.stages.ingest.own_poses import with_own_poses
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
 from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
 from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
+from scenewright.stages.kit.formats.exif import orientation_of
 from scenewright.stages.kit.formats.foxglove import millimetres_to_depth, nanoseconds
 from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.kit.formats.trajectories import write_tum
 from scenewright.stages.kit.geometry.surface_samples import surface_samples
-from scenewright.stages.kit.geometry.upright_world import make_upright
+from scenewright.stages.kit.geometry.upright_world import REASON, make_upright
 from scenewright.stages.kit.stage import Context
 
 GRAVITY_FRAMES = 60
@@ -30,16 +35,23 @@ PLAUSIBLE_MEDIAN_DEPTH = (0.15, 15.0)
 """Median depth [m] outside of which the depth unit is doubted; by eye."""
 LARGE_STEP = 1.0
 """Step of the camera between two frames [m] that is reported; by eye."""
+NO_POSES = "frames have no poses"
+ROUGH = 0.05
+"""Roughness of what is no depth; five times that of the roughest sensor."""
 LIT_EVERY, DARK = 10, 8.0
 """Every so many frames' pictures are looked at; with a lower mean of 255 they show nothing."""
-StreamName = Literal["color", "depth", "right", "labels", "pose"]
 
 
-def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequence:
-    """Write the usable frames of a log with calibration, gravity-aligned poses and the reasons for all others."""
+def run(log: Path, trajectory: Path | None = None, *, parameters: IngestParameters, context: Context) -> Sequence:
+    """Write the usable frames of a log with calibration, gravity-aligned poses and the reasons for all others.
+
+    A trajectory of one's own takes the place of the log's poses.
+    """
     with context.progress.step("read the log"):
         source = open_log(Path(log), parameters)
     try:
+        if trajectory is not None:
+            source = with_own_poses(source, Path(trajectory), parameters)
         check_cameras(source, log)
         context.logger.info("%s: %s", log, source.rule)
         for line in source.damage:
@@ -52,6 +64,9 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
             written = _write_frames(source, entries, gravity, drops, parameters, context)
     finally:
         source.close()
+    sources = named_sources(written.entries, source.entries, log if log.is_dir() else log.parent)
+    if sources is not None:
+        sources.write(context.output / "sources.json")
     return _finish(source, gravity, drops, written, parameters, context)
 
 
@@ -59,6 +74,7 @@ def run(log: Path, *, parameters: IngestParameters, context: Context) -> Sequenc
 class _Written:
     """What was written, as far as the summary needs it."""
 
+    entries: list[Entry] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
     posed_times: list[float] = field(default_factory=list)
     poses: list[np.ndarray] = field(default_factory=list)
@@ -66,7 +82,11 @@ class _Written:
     """Camera of each frame."""
     pose_cameras: list[str] = field(default_factory=list)
     """Camera of each frame that has a pose."""
+    orientations: int = 0
+    """Pictures with an EXIF orientation that was taken off."""
     median_depths: list[float] = field(default_factory=list)
+    roughness: list[float] = field(default_factory=list)
+    """Of every tenth depth image (`depth_roughness`)."""
     brightness: list[float] = field(default_factory=list)
     """Mean of every tenth picture, 0 to 255."""
     streams: set[StreamName] = field(default_factory=set)
@@ -176,17 +196,22 @@ def _write_frames(
                 right=loaded.right,
                 camera_name=entry.camera_name,
             )
-            _note(written, time, entry.camera_name, loaded, pose)
+            _note(written, time, entry, loaded, pose)
         if writing is not None:
             writing.result()
     return written
 
 
-def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
+def _note(written: _Written, time: float, entry: Entry, loaded: LoadedFrame, pose: np.ndarray | None) -> None:
     if loaded.color is not None and len(written.times) % LIT_EVERY == 0:
         written.brightness.append(brightness_of(loaded.color))
+    if loaded.depth is not None and len(written.times) % LIT_EVERY == 0:
+        written.roughness.append(depth_roughness(loaded.depth))
+    if isinstance(loaded.color, bytes) and orientation_of(loaded.color) != 1:
+        written.orientations += 1
+    written.entries.append(entry)
     written.times.append(time)
-    written.cameras.append(camera_name)
+    written.cameras.append(entry.camera_name)
     streams: dict[StreamName, object] = {
         "color": loaded.color,
         "depth": loaded.depth,
@@ -200,7 +225,7 @@ def _note(written: _Written, time: float, camera_name: str, loaded: LoadedFrame,
     if pose is not None:
         written.posed_times.append(time)
         written.poses.append(pose)
-        written.pose_cameras.append(camera_name)
+        written.pose_cameras.append(entry.camera_name)
 
 
 def _within(loaded: LoadedFrame, maximum_depth: float | None) -> LoadedFrame:
@@ -220,7 +245,7 @@ def _finish(
     parameters: IngestParameters,
     context: Context,
 ) -> Sequence:
-    notes = [*source.notes, *_pose_notes(parameters), *_warnings(source, written)]
+    notes = [*source.notes, *_pose_notes(parameters), *_gravity_notes(gravity), *_warnings(source, written)]
     for note in notes:
         (context.logger.warning if note.startswith("WARNING") else context.logger.info)("%s", note)
     write_tum(
@@ -264,7 +289,8 @@ def _finish(
         summary["damage"] = len(source.damage)
     if not written.times:
         worst = ", ".join(f"{reason} {count}" for reason, count in drops.most_common()) or "no frames in the log"
-        summary["reason"] = f"no usable frame: {worst}"
+        advice = "; ".join(ADVICE[reason] for reason, _ in drops.most_common() if reason in ADVICE)
+        summary["reason"] = f"no usable frame: {worst}" + (f" ({advice})" if advice else "")
         context.logger.warning("%s", summary["reason"])
     return Sequence(context.output, outcome="ok" if written.times else "empty", summary=summary)
 
@@ -278,6 +304,14 @@ def _pose_notes(parameters: IngestParameters) -> list[str]:
     if parameters.pose_scale != 1:
         notes.append(f"positions of the log multiplied by {parameters.pose_scale:g}, by option")
     return notes
+
+
+def _gravity_notes(gravity: Gravity) -> list[str]:
+    """Why up may be wrong."""
+    reason = REASON.search(gravity.detail)
+    if reason is None or reason[1] != "doubtful":
+        return []
+    return [f"WARNING: up may be wrong: {reason[2]} (--gravity given --up AXIS)"]
 
 
 def brightness_of(picture: np.ndarray | bytes) -> float:
@@ -297,6 +331,11 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
             f"WARNING: median depth is {written.median_depth:.3g} m; is the depth unit right (depth_scale)? "
             "`scenewright inspect` tells"
         )
+    if written.roughness and (rough := float(np.median(written.roughness))) > ROUGH:
+        notes.append(
+            f"WARNING: neighbouring pixels of depth differ by {100 * rough:.0f} %, as in no depth image: is it stored "
+            "otherwise (--depth-bits)? `scenewright inspect` tells"
+        )
     if written.brightness and (lit := float(np.median(written.brightness))) < DARK:
         notes.append(
             f"WARNING: the pictures are all but black ({lit:.0f} of 255): a lens cap, or night; what is mapped has the "
@@ -307,14 +346,19 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
     step = max((largest_step(poses[names == name]) for name in sorted(set(written.pose_cameras))), default=0.0)
     if step > LARGE_STEP:
         notes.append(f"WARNING: the camera jumps {step:.2f} m between two frames")
-    if written.times and not written.poses:
-        notes.append("frames have no poses")
+    if written.times and not written.poses and not any(note.startswith(NO_POSES) for note in source.notes):
+        notes.append(NO_POSES)
     if written.times and "color" not in written.streams:
         notes.append(
             "WARNING: frames have no colour: what is mapped has the shape that depth gives, names are guessed from "
             "shape alone, and steps that need pictures refuse"
         )
-    if written.times and "depth" not in written.streams:
+    if written.orientations:
+        notes.append(
+            f"{written.orientations} pictures state an EXIF orientation: the calibration is taken to be of the pixels "
+            "as they are stored, and the orientation is left out"
+        )
+    if written.times and "depth" not in written.streams and "depth" not in source.missing:
         notes.append("frames have no depth")
     if source.other_cameras:
         notes.append(f"other cameras of the log: {', '.join(source.other_cameras)} (--camera NAME, --camera all)")

@@ -10,9 +10,15 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.lenses import Lens, has_projection, lens_of, scaled_matrix, turned_lens
 from scenewright.stages.ingest.messages.records import CalibrationRecord
+from scenewright.stages.kit.geometry.transforms import transform_from
 
 SMALLEST_BASELINE = 1e-3
 """Eyes nearer to each other than this [m] are one camera."""
+LARGEST_BASELINE = 1.0
+"""Largest distance of two eyes [m]; what is more is stated in another unit."""
+UNCLEAR = (5.0, 20.0)
+"""As millimetres rare, as centimetres usual. Less is millimetres of an endoscope, whose shaft holds both eyes; more is
+too far apart in centimetres."""
 PARALLEL = math.radians(20)
 """Eyes that look further apart than this are two cameras, not a pair."""
 
@@ -25,6 +31,25 @@ def projected_baseline(left: CalibrationRecord, right: CalibrationRecord) -> flo
     if not has_projection(left) or not has_projection(right) or (left.P[3] == 0 and right.P[3] == 0):
         return None
     return left.P[3] / left.P[0] - right.P[3] / right.P[0]
+
+
+def in_metres(baseline: float, where: str) -> tuple[float, str | None]:
+    """Return a baseline of a calibration file in metres, and what was assumed: it has the unit of whoever calibrated.
+
+    Raises BadInput for one that may as well be in centimetres.
+    """
+    length = abs(baseline)
+    if length <= LARGEST_BASELINE:
+        return baseline, None
+    others = f"--baseline {length / 100:.4g} if it is in centimetres"
+    low, high = UNCLEAR
+    if low <= length < high:
+        raise BadInput(
+            f"{where}: by the calibration the eyes stand {length:.4g} apart, too far for metres: centimetres, or "
+            "millimetres?",
+            hint=f"{others}, --baseline {length / 1000:.4g} if in millimetres",
+        )
+    return baseline / 1000, f"WARNING: baseline of {length:.4g} taken as millimetres ({others})"
 
 
 def is_pair(left: CalibrationRecord, right: CalibrationRecord, left_from_right: np.ndarray | None) -> bool:
@@ -45,22 +70,26 @@ def stereo_lenses(
     left_from_right: np.ndarray | None,
     names: tuple[str, str],
     where: str,
+    given: float | None = None,
 ) -> tuple[Lens, Lens, float]:
-    """Return the lenses of the left and the right eye, whose images then differ along rows alone, and the baseline [m].
+    """Return the lenses of the left and the right eye, whose images then differ along rows alone, and the baseline in
+    the unit of the calibrations, negative where they say that left and right are exchanged; or the `given` one [m].
 
     Taken from the projections P and rotations R of the calibrations, else from `left_from_right` (4, 4). `names` are
-    the topics. Raises BadInput for eyes that are swapped, at one place or one above the other, and when the log does
-    not say how they stand to each other.
+    the topics. Raises BadInput for eyes at one place or one above the other, and when the log does not say how they
+    stand to each other.
     """
     left, right = calibrations
     baseline = projected_baseline(left, right)
+    if baseline is None and left_from_right is not None:
+        return _from_transform(calibrations, sizes, rectified, left_from_right, names, where, given)
+    if given is not None and has_projection(left) and has_projection(right):
+        baseline = given  # two rectified cameras, and somebody who knows how far apart they stand
     if baseline is None:
-        if left_from_right is None:
-            raise BadInput(
-                f"{where}: nothing says how {names[0]} and {names[1]} stand to each other",
-                hint="record their CameraInfo with P[3], or tf_static",
-            )
-        return _from_transform(calibrations, sizes, rectified, left_from_right, names, where)
+        raise BadInput(
+            f"{where}: nothing says how {names[0]} and {names[1]} stand to each other",
+            hint="record their CameraInfo with P[3], or tf_static; of rectified cameras give --baseline METRES",
+        )
     _check_baseline(baseline, names, where)
     if abs(right.P[7] - left.P[7]) > abs(right.P[3] - left.P[3]):
         raise _one_above_the_other(names, where)
@@ -82,13 +111,16 @@ def _from_transform(
     left_from_right: np.ndarray,
     names: tuple[str, str],
     where: str,
+    given: float | None,
 ) -> tuple[Lens, Lens, float]:
-    """Rectify by turning both eyes so that their common x axis runs through both centres."""
+    """Rectify by turning both eyes so that their common x axis runs through both centres, the left picture's own x."""
     offset = left_from_right[:3, 3]
-    baseline = float(np.linalg.norm(offset))
-    if abs(offset[1]) > abs(offset[0]) and baseline >= SMALLEST_BASELINE:
+    baseline = math.copysign(float(np.linalg.norm(offset)), offset[0])
+    if abs(offset[1]) > abs(offset[0]) and abs(baseline) >= SMALLEST_BASELINE:
         raise _one_above_the_other(names, where)
-    _check_baseline(math.copysign(baseline, offset[0]), names, where)
+    _check_baseline(baseline, names, where)
+    left_from_right = transform_from(left_from_right[:3, :3], offset * math.copysign(1.0, baseline))
+    baseline = baseline if given is None else given
     turn = rectifying_rotation(left_from_right)
     plain = lens_of(calibrations[0], sizes[0], rectified[0], where, names[0])
     right_turn = turn @ left_from_right[:3, :3]
@@ -124,12 +156,7 @@ def _check_baseline(baseline: float, names: tuple[str, str], where: str) -> None
     if abs(baseline) < SMALLEST_BASELINE or not math.isfinite(baseline):
         raise BadInput(
             f"{where}: {names[0]} and {names[1]} have no baseline ({baseline:g} m), so they are no stereo pair",
-            hint="choose the right topic, or correct P[3] of its calibration",
-        )
-    if baseline < 0:
-        raise BadInput(
-            f"{where}: left and right are swapped: {names[1]} stands {-baseline:.4g} m to the left of {names[0]}",
-            hint=f"--color-topic {names[1]} --right-topic {names[0]}",
+            hint="choose the right topic, or give --baseline METRES",
         )
 
 

@@ -79,6 +79,13 @@ class Track:
             return None
         return interpolated(_matrix(rows[after - 1]), _matrix(rows[after]), (stamp - before) / (then - before))
 
+    def gap_at(self, stamp: int) -> int:
+        """Return how far the samples before and after `stamp` are apart [ns], 0 at a sample and outside of them."""
+        stamps, _ = self.samples()
+        after = int(np.searchsorted(stamps, stamp))
+        inside = 0 < after < len(stamps) and stamps[after] != stamp
+        return int(stamps[after] - stamps[after - 1]) if inside else 0
+
     def why_not(self, stamp: int) -> str:
         """Return in words why there may be nothing at `stamp` [ns]."""
         stamps, _ = self.samples()
@@ -201,6 +208,11 @@ class TransformTree:
             if not self.is_constant(frame) and self._track(frame).at(stamp, gap=gap, tolerance=tolerance) is None:
                 return f"{self.parent(frame)!r} -> {frame!r} {self._track(frame).why_not(stamp)}"
         return ""
+
+    def gap_at(self, target: str, source: str, stamp: int) -> int:
+        """Return the largest gap [ns] that `lookup` has to interpolate over at `stamp`."""
+        moving = [frame for frame in self.between(target, source) if not self.is_constant(frame)]
+        return max((self._track(frame).gap_at(stamp) for frame in moving), default=0)
 
     def is_static(self, frame: str) -> bool:
         """Whether the edge above a frame was published as static."""

@@ -172,7 +172,7 @@ def parse_words(words: Iterable[str], where: str) -> tuple[Label, ...]:
             raise BadInput(f"{where}: a word of {len(word)} letters", hint=f"at most {LONGEST_WORD}")
         labels.append(Label(name=word, class_name=class_name if is_assigned else class_of_word(word)))
     if not labels:
-        raise BadInput(f"{where}: no words", hint='for example --words "cup, table, kettle"')
+        raise BadInput(f"{where}: no words", hint="for example: cup, table, kettle")
     _check(tuple(labels), where)
     return tuple(labels)
 

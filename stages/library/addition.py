@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,27 +14,21 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.cad_models import model_folder
 from scenewright.stages.kit.formats.model_writer import write_model_folder
+from scenewright.stages.kit.geometry.file_axes import AXES, UNITS, Direction, axis_name, upright_rotation
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.library.importing.assembly import Assembled, assembled
 from scenewright.stages.library.importing.classes import class_of, usual_size
 from scenewright.stages.library.importing.discovery import Unread, find_models
-from scenewright.stages.library.importing.frames import (
-    AXES,
-    UNITS,
-    Choice,
-    axis_name,
-    choose,
-    model_rotation,
-    upright_rotation,
-)
-from scenewright.stages.library.importing.fronts import told_front
-from scenewright.stages.library.importing.grouping import grouped, source_points
+from scenewright.stages.library.importing.frames import Choice, choose, model_rotation
+from scenewright.stages.library.importing.fronts import BACKED, front_of_back_rest, told_front
+from scenewright.stages.library.importing.grouping import Group, grouped, source_corners, source_points
 from scenewright.stages.library.importing.limits import few_findings, plain_text, told_refusals
 from scenewright.stages.library.importing.mapping import SKIP, Entry, Mapping, read_mapping
+from scenewright.stages.library.importing.mesh_units import apart, far_hinge, in_unit, names_meshes
 from scenewright.stages.library.importing.placing import centered, placed_parts, plain_name, turned
 from scenewright.stages.library.importing.report import table_lines
 from scenewright.stages.library.importing.source_folder import SourceFolder
-from scenewright.stages.library.importing.source_model import Declared, Direction, SourceModel
+from scenewright.stages.library.importing.source_model import Declared, SourceModel
 from scenewright.stages.library.importing.versions import uses_coacd
 from scenewright.stages.library.parameters import AdditionParameters
 
@@ -112,7 +107,7 @@ def run(
         context.logger.info(line)
     if imported == 0:
         why = _why(records[-1]) if records else "it holds no model files"
-        raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md; --class-name, --mapping")
+        raise BadInput(f"{models}: nothing was imported: {why}", hint="see docs/LIBRARY.md")
     affordance_files = tuple(uses[model.id] for model in all_models if model.id in uses)
     LibraryFile(seed=seed, models=tuple(all_models), affordances=affordance_files).write(
         context.output / "library.json"
@@ -183,21 +178,38 @@ def _import(
     points = source_points(groups)
     if not np.isfinite(points).all() or float(np.abs(points).max()) > 1e9:
         raise BadInput(f"{source.source}: corners are not finite, or far away")
-    choice = choose(
-        settings.unit(source), settings.up(source), points, usual_size(class_name), source.format in Y_UP_FORMATS
-    )
-    extent = choice.unit * float(np.ptp(points, axis=0).max())
+    unit, up = settings.unit(source), settings.up(source)
+    described = names_meshes(source)
+
+    def points_in(metres: float) -> np.ndarray:
+        if not described or (unit.origin != "option" and metres == unit.value):
+            return metres * points
+        changed, scale, _ = in_unit(source, metres)
+        return scale * source_points(grouped(changed)[0])
+
+    told_up = _told_up(groups, class_name) if up.value is None else None
+    choice = choose(unit, up, points_in, usual_size(class_name), source.format in Y_UP_FORMATS, told_up)
+    extent = float(np.ptp(points_in(choice.unit), axis=0).max())
     if not SMALLEST <= extent <= LARGEST:
         raise BadInput(
             f"{source.source}: {extent:.3g} m large in units of {choice.unit:g} m", hint="--unit says otherwise"
         )
+    scale = choice.unit
+    if described and choice.unit_origin == "option":
+        source, scale, finding = in_unit(source, choice.unit)
+        findings += [finding] if finding else []
+        groups, _ = grouped(source)
+    if (far := apart(groups)) is not None:
+        findings.append(f"{far[0]!r:.40} lies {far[1] * scale:.3g} m from everything else of it")
+    if (hinge := far_hinge(groups)) is not None:
+        findings.append(f"the axis of joint {hinge[0]!r:.40} passes {hinge[1] * scale:.3g} m from its part")
     front = settings.front(source)
     given_front = front.value if isinstance(front.value, tuple) else None
     placed, findings_of_parts = placed_parts(
         source,
         groups,
         model_rotation(choice.up, given_front),
-        choice.unit,
+        scale,
         collision_given=parameters.collision == "given",
         decompose=decompose,
     )
@@ -221,6 +233,15 @@ def _import(
     findings = [*choice.findings, *source.findings, *findings, *findings_of_parts, *result.findings]
     result = replace(result, findings=few_findings([plain_text(finding) for finding in findings]))
     return _record(source, result, choice, front_name, front_from), result
+
+
+def _told_up(groups: Sequence[Group], class_name: str) -> Direction | None:
+    """Return the one of +y and +z with which a chair or the like has a back rest; None when both or neither."""
+    if class_name not in BACKED:
+        return None
+    corners = source_corners(groups)
+    told = [up for up in (AXES["+y"], AXES["+z"]) if front_of_back_rest(corners @ upright_rotation(up).T) is not None]
+    return told[0] if len(told) == 1 else None
 
 
 def _free_id(name: str, names: dict[str, int]) -> str:

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 from scenewright.schemas.cad_library import CadLibrary
 from scenewright.stages.kit.estimates import Estimate, Inputs
+from scenewright.stages.kit.known_names import AxisName, UnitName
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 
@@ -23,13 +24,14 @@ class AdditionParameters(Parameters):
 
     class_name: str = Field("", description="Class of all models; without it the names of models and folders tell")
     unknown: Literal["skip", "object"] = Field("skip", description="What becomes of models whose class nothing tells")
-    unit: Literal["declared", "m", "dm", "cm", "mm", "inch", "foot"] = Field(
-        "declared", description="Unit of the files, whatever they declare"
+    unit: Literal["declared", UnitName] = Field(
+        "declared",
+        description="Unit of the files, whatever they declare; of the mesh files that a URDF, SDF or MJCF names",
     )
-    up: Literal["declared", "+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+    up: Literal["declared", AxisName] = Field(
         "declared", description="Axis of the files that points up, whatever they declare"
     )
-    front: Literal["declared", "+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+    front: Literal["declared", AxisName] = Field(
         "declared", description="Axis of the files that points to the front, whatever they declare"
     )
     collision: Literal["given", "visual"] = Field(

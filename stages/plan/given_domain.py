@@ -20,7 +20,7 @@ from scenewright.schemas.outside import LARGEST_SETTINGS, file_text
 from scenewright.schemas.plan import Check
 from scenewright.stages.kit.predicates.evaluating import Evaluator
 from scenewright.stages.kit.predicates.expressions import Predicate, check, read
-from scenewright.stages.kit.predicates.goal_words import goal_phrases
+from scenewright.stages.kit.predicates.goal_sentences import read_goal
 from scenewright.stages.kit.predicates.room import ROOM_WORDS, perceive
 from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR
 from scenewright.stages.kit.tasks.pddl import parse_domain
@@ -74,10 +74,11 @@ class GivenDomain:
 
     def in_words(self, sentence: str, objects: Mapping[str, str]) -> frozenset[Atom] | None:
         """Return the atoms of a goal in words that were taught, None where a part was not."""
+        reading = read_goal(sentence, objects, self.goals)
+        if reading.lacking:
+            return None
         atoms: set[Atom] = set()
-        for part, objects_named in goal_phrases(sentence, objects):
-            if part not in self.goals:
-                return None
+        for part, objects_named in reading.parts:
             atoms |= {
                 (self.name_here(name), *(objects_named[argument] for argument in places))
                 for name, places in self.goals[part]

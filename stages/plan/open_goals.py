@@ -77,9 +77,17 @@ def _likeliest(
         candidates = [(k, node) for k, node in candidates if len(names[k]) == longest and words[-longest:] == names[k]]
     best = max(((float(fits.probabilities[k]), node.id) for k, node in candidates), default=(0.0, "nothing"))
     if best[0] < LEAST_PROBABILITY and longest < len(words):
-        strange = ", for the encoder has learned no pictures like these" if finder.is_strange else ""
         raise UsageError(
-            f"goal: the scene has no {text!r}: {best[1]} is the likeliest, with probability {best[0]:.2f}{strange}",
+            f"goal: {_lacking(text, finder)}: {best[1]} is the likeliest, with probability {best[0]:.2f}",
             hint="name the node, or say it in other words",
         )
     return best[1]
+
+
+def _lacking(text: str, finder: Finder) -> str:
+    """Return that the scene lacks what a text names, or why nobody knows whether it does."""
+    if not finder.cannot_tell(text):
+        return f"the scene has no {text!r}"
+    unread = ", ".join(map(repr, finder.encoder.unread(text)))
+    why = f"the encoder has never read {unread}" if unread else "the encoder has learned no pictures like these"
+    return f"whether the scene has {text!r} is unknown, for {why}"

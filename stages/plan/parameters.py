@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pydantic import Field
+from scenewright.schemas.errors import UsageError
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.language_map import LanguageMap
@@ -12,6 +14,8 @@ from scenewright.schemas.plan import Plan
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.estimates import grows_with
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
+
+STAND = "--stand X --stand Y --stand YAW, in metres and degrees"
 
 
 class PlanParameters(Parameters):
@@ -94,6 +98,16 @@ def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
     return (*names, "words/two_towers.safetensors", "words/calibration.toml")
 
 
+def check_options(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for options that do not go together."""
+    if parameters.goal and parameters.task:
+        raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
+    if parameters.stand and len(parameters.stand) != 3:
+        raise UsageError(f"--stand has {len(parameters.stand)} values", hint=STAND)
+    if inputs.get("domain") is not None and parameters.planner != "builtin":
+        raise UsageError("--planner fast-downward plans in the scene's own domain", hint="leave --domain or it out")
+
+
 STAGE = Stage(
     name="plan",
     summary="Plan what a robot does in the scene, execute it in physics, check the goal or say why not",
@@ -108,6 +122,7 @@ STAGE = Stage(
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
     data_files=plan_files,
+    check=check_options,
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "
     "--out outputs/demo/plan",
     estimate=grows_with("scene", 2.2, 0.0, 640, 0.0),

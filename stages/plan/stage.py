@@ -30,7 +30,7 @@ from scenewright.stages.plan.domain import DOMAIN
 from scenewright.stages.plan.given_domain import read_given_domain
 from scenewright.stages.plan.goals import TABLE_CLASSES, default_goals
 from scenewright.stages.plan.open_goals import has_words, named_goal
-from scenewright.stages.plan.parameters import PlanParameters
+from scenewright.stages.plan.parameters import STAND, PlanParameters
 from scenewright.stages.plan.pick_place import Budgets
 from scenewright.stages.plan.plan_text import plan_text
 from scenewright.stages.plan.reading import Reading
@@ -90,8 +90,6 @@ def run(
 
     `domain`: predicates and operators to plan with instead of the chain's (`read_given_domain`). `sequence`: the log
     that the scene was made of; the robot starts where its camera was."""
-    if parameters.goal and parameters.task:
-        raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     reading = Reading(None if domain is None else read_given_domain(domain))
     robot = load_robot(parameters.robot)
     budgets = Budgets(
@@ -203,12 +201,8 @@ def _start(
     cameras: np.ndarray | None,
 ) -> np.ndarray:
     """Return where the robot starts (3,). Raises UsageError for no place, MotionFailed for none that is free."""
-    if stand and len(stand) != 3:
-        raise UsageError(f"--stand has {len(stand)} values", hint="x y [m] and yaw [deg]")
     if not stand and not model.description.drives:
-        raise UsageError(
-            f"the robot {model.description.name} does not drive", hint="say where it is with --stand X Y YAW"
-        )
+        raise UsageError(f"the robot {model.description.name} does not drive", hint=f"say where it is: {STAND}")
     if not stand:
         return start_base(model, carry, random, cameras=cameras)
     base = np.array([*stand[:2], np.radians(stand[2])])
@@ -223,8 +217,6 @@ def _warn_of_ungrounded(scene: Scene, parameters: PlanParameters, context: Conte
     domain = scene.reading.given
     if domain is None:
         return ()
-    if parameters.planner != "builtin":
-        raise UsageError("--planner fast-downward plans in the scene's own domain", hint="leave --domain or it out")
     classes = {name: record.class_name for name, record in scene.model.records.items()}
     words = domain.ungrounded(scene.objects, classes)
     if words:

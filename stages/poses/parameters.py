@@ -67,9 +67,9 @@ class PosesParameters(Parameters):
 def check(parameters: PosesParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options that do not go together."""
     if parameters.bundle_adjustment and not parameters.use_color:
-        raise UsageError("--bundle-adjustment needs colour", hint="leave out --no-use-color")
+        raise UsageError("--bundle-adjustment needs colour", hint="leave --no-use-color out")
     if parameters.method == "sfm" and not parameters.use_color:
-        raise UsageError("--method sfm needs colour", hint="use --method rgbd")
+        raise UsageError("--method sfm needs colour", hint="leave --no-use-color out, or use --method rgbd")
 
 
 STAGE = Stage(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
@@ -13,15 +13,19 @@ from scenewright.schemas.trajectory import FrameEstimate, LoopClosure, PosesFile
 from scenewright.stages.kit.formats.frames import FrameReader, require_depth
 from scenewright.stages.kit.formats.trajectories import write_tum
 from scenewright.stages.kit.stage import Context
+from scenewright.stages.poses.contradiction import contradicted
 from scenewright.stages.poses.drift import drift_of, loop_closures, path_length
 from scenewright.stages.poses.estimation import estimate
 from scenewright.stages.poses.frame_poses import FramePose, frame_poses
 from scenewright.stages.poses.parameters import PosesParameters
-from scenewright.stages.poses.world import choose_world
+from scenewright.stages.poses.world import choose_world, without_poses
 
 MOST_CONTRADICTED, FEWEST_LOOPS = 0.15, 10
 """A path is not to be trusted that denies more than this share of its loops, of so many at least. Of four good paths
 none to a tenth was denied, of three that were off by a decimetre and more 16 to 52 % (docs/POSES.md)."""
+
+CONTRADICTED = "contradicted"
+"""Fault of a frame that the depth of the others contradicts where the path had put it."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +49,12 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
     colour where the method needs it, or with fewer than two frames of its main camera.
     """
     require_depth(sequence)
-    if not sequence.path("frames.mcap").is_file():
-        raise BadInput(f"{sequence.root}: frames.mcap is missing", hint="run `scenewright ingest` again")
     with FrameReader(sequence.path("frames.mcap")) as reader:
         camera_name, frames = main_camera(reader, sequence)
         check_streams(reader, sequence, parameters)
         check_world(reader, frames, sequence, parameters)
         result = METHODS[parameters.method].estimate(reader, frames, camera_name, parameters, context)
+        result = _without_contradicted(result, reader, camera_name, parameters, context)
         return _finish(reader, camera_name, result, parameters, context)
 
 
@@ -60,27 +63,28 @@ def main_camera(reader: FrameReader, sequence: Sequence) -> tuple[str, list[int]
     if len(reader) == 0:
         raise BadInput(f"{sequence.root}: it has no frames", hint="look at the drops in its sequence.json")
     name = sequence.info.cameras[0].name
-    if name not in reader.cameras:
-        raise BadInput(f"{sequence.root}: its main camera {name!r} has no frames", hint="ingest with --camera NAME")
     frames = [index for index in range(len(reader)) if reader.read(index, ()).camera_name == name]
     if len(frames) < 2:
-        raise BadInput(f"{sequence.root}: one frame has no path", hint="poses need two frames of one camera or more")
+        count = f"{len(frames)} frame{'s' * (len(frames) != 1)}"
+        raise BadInput(
+            f"{sequence.root}: its main camera {name!r} has {count}, a path needs two",
+            hint="ingest the whole log, or another camera of it: --camera NAME",
+        )
     return name, frames
 
 
 def check_streams(reader: FrameReader, sequence: Sequence, parameters: PosesParameters) -> None:
     """Raise BadInput when colour is needed and there is none."""
-    needs = METHODS[parameters.method].needs_color(parameters)
-    if needs and "color" not in reader.streams:
+    if METHODS[parameters.method].needs_color(parameters) and "color" not in reader.streams:
         raise BadInput(
-            f"{sequence.root}: {needs} needs colour and its frames have none", hint="use --method rgbd alone"
+            f"{sequence.root}: its frames have no colour", hint="use --method rgbd without --bundle-adjustment"
         )
 
 
 def check_world(reader: FrameReader, frames: list[int], sequence: Sequence, parameters: PosesParameters) -> None:
     """Raise BadInput, before any work, when the world of a sequence without poses is asked for."""
     if parameters.world == "sequence" and all(reader.read(k, ()).world_from_camera is None for k in frames):
-        raise BadInput(f"{sequence.root}: none of its frames has a pose in the sequence", hint="--world upright")
+        raise without_poses(f"{sequence.root}: none of its frames")
 
 
 def _dense(
@@ -120,14 +124,27 @@ class Method:
 
     estimate: Callable[[FrameReader, list[int], str, PosesParameters, Context], Result]
     """Of the given frames of the camera of this name."""
-    needs_color: Callable[[PosesParameters], str]
-    """The option that needs colour, empty when none does."""
+    needs_color: Callable[[PosesParameters], bool]
 
 
 METHODS = {
-    "rgbd": Method(_dense, lambda parameters: "--bundle-adjustment" if parameters.bundle_adjustment else ""),
-    "sfm": Method(_structure, lambda parameters: "--method sfm"),
+    "rgbd": Method(_dense, lambda parameters: parameters.bundle_adjustment),
+    "sfm": Method(_structure, lambda parameters: True),
 }
+
+
+def _without_contradicted(
+    result: Result, reader: FrameReader, camera_name: str, parameters: PosesParameters, context: Context
+) -> Result:
+    """Return the result without the poses that the depth of the other frames contradicts."""
+    with context.progress.step("contradictions"):
+        wrong = contradicted(
+            reader, reader.cameras[camera_name], result.poses, parameters.minimum_agreement, parameters.maximum_depth
+        )
+    poses = [
+        FramePose(pose.frame, None, "unposed", CONTRADICTED) if pose.frame in wrong else pose for pose in result.poses
+    ]
+    return replace(result, poses=poses)
 
 
 def _finish(
@@ -179,7 +196,7 @@ def outcome_of(info: PosesFile) -> str:
     unposed = sum(frame.status == "unposed" for frame in info.frames)
     if unposed == len(info.frames):
         return "empty"
-    if contradicted_share(info.loops) > MOST_CONTRADICTED:
+    if is_contradictory(info):
         return "contradictory"
     return "tracking_lost" if unposed else "ok"
 
@@ -188,6 +205,17 @@ def contradicted_share(loops: Iterable[LoopClosure]) -> float:
     """Return the share of the loops that the path denies: both were aligned surface on surface, one of them wrongly."""
     denied = [loop.weight < 0.5 for loop in loops]
     return sum(denied) / max(len(denied), FEWEST_LOOPS)
+
+
+def wrong_frames(info: PosesFile) -> int:
+    """Return how many frames the depth of the others contradicted where the path had put them."""
+    return sum(frame.fault == CONTRADICTED for frame in info.frames)
+
+
+def is_contradictory(info: PosesFile) -> bool:
+    """Whether the path denies too many of its loops, or of its frames."""
+    too_many = wrong_frames(info) > MOST_CONTRADICTED * len(info.frames)
+    return too_many or contradicted_share(info.loops) > MOST_CONTRADICTED
 
 
 def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, object]:
@@ -210,11 +238,13 @@ def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, obj
             f"({', '.join(f'{reason} {count}' for reason, count in sorted(reasons.items()))}): {where}"
         )
         context.logger.warning("%s", summary["reason"])
-    if contradicted_share(info.loops) > MOST_CONTRADICTED:
+    if is_contradictory(info):
         denied = sum(loop.weight < 0.5 for loop in info.loops)
+        what = f"{denied} of {len(info.loops)} places that look the same"
+        if contradicted_share(info.loops) <= MOST_CONTRADICTED:
+            what = f"the depth of {wrong_frames(info)} of {len(info.frames)} frames"
         summary["reason"] = (
-            f"the path denies {denied} of {len(info.loops)} places that look the same: it may be off by decimetres; "
-            "record more pictures a second, or turn more slowly"
+            f"the path denies {what}: it may be off by decimetres; record more pictures a second, or turn more slowly"
         )
         context.logger.warning("%s", summary["reason"])
     return summary

@@ -30,6 +30,11 @@ def laid_onto(estimated: np.ndarray, given: np.ndarray) -> np.ndarray:
     return transform_from(rotation, (given[:, :3, 3] - estimated[:, :3, 3] @ rotation.T).mean(axis=0))
 
 
+def without_poses(frames: str) -> BadInput:
+    """Return the error of a world of the sequence that none of the `frames` knows."""
+    return BadInput(f"{frames} has a pose in the sequence", hint="choose --world upright or first")
+
+
 def choose_world(
     world: str, reader: FrameReader, frames: list[int], poses: np.ndarray, random: np.random.Generator
 ) -> tuple[World, Gravity]:
@@ -45,7 +50,7 @@ def choose_world(
         detail = f"laid onto the sequence's own poses of {len(rows)} frames"
         return "sequence", Gravity(method="given", world_from_log=as_transform(motion), detail=detail)
     if world == "sequence":
-        raise BadInput("none of the frames has a pose in the sequence", hint="--world upright")
+        raise without_poses("none of the frames that were placed")
     if world == "first":
         return "first", Gravity(method="none", world_from_log=as_transform(np.eye(4)), detail="not asked for")
 

@@ -22,7 +22,8 @@ MOST_STEPS, MOST_FAILURES = 20, 5
 """Most actions of a task, and most failures; by eye."""
 ARITY = {name: count for setting in SETTINGS.values() for name, count in setting.arity.items()}
 PLANNING_LIMIT, SHORTENING = 5_000, 300
-"""Expanded states of one search, and of each that looks for a shorter plan: plans are wanted within moments."""
+"""Expanded states of one search, and of each that looks for a shorter plan: plans are wanted within moments. While a
+plan has more actions than the task allows, as many states as a search may take go into shorter ones."""
 
 
 def action_atom(action: GroundAction) -> Atom:
@@ -47,8 +48,9 @@ class Attempt:
 
 
 Abstraction = Callable[[Perceived], frozenset[Atom]]
-Planner = Callable[[Domain, list[str], frozenset[Atom], frozenset[Atom], frozenset[Atom]], tuple[TaskPlan, float]]
-"""Domain, objects, what holds, what is wanted, actions to avoid -> plan and the seconds that it took."""
+Planner = Callable[[Domain, list[str], frozenset[Atom], frozenset[Atom], frozenset[Atom], int], tuple[TaskPlan, float]]
+"""Domain, objects, what holds, what is wanted, actions to avoid, actions that may still be done -> plan and the seconds
+that it took."""
 
 
 class World(Protocol):
@@ -146,7 +148,8 @@ def attempt(
                 break
             if result.steps and not replan:
                 break
-            outcome, seconds = planner(domain, list(task.objects), atoms, goal, frozenset(avoided))
+            left = MOST_STEPS - len(result.steps)
+            outcome, seconds = planner(domain, list(task.objects), atoms, goal, frozenset(avoided), left)
             result.planning.append(seconds)
             if not outcome.actions:
                 result.unreachable = outcome.unreachable
@@ -175,35 +178,55 @@ def attempt(
     return result
 
 
+def why_not(result: Attempt) -> str:
+    """Return in words why a goal was not reached."""
+    failed = [f"{' '.join(action)}: {reason}" for action, reason in result.steps if reason]
+    return result.unplanned or (failed[-1] if failed else f"not there after {len(result.steps)} actions")
+
+
 def timed_plan(
-    domain: Domain, objects: list[str], atoms: frozenset[Atom], goal: frozenset[Atom], avoided: frozenset[Atom]
+    domain: Domain,
+    objects: list[str],
+    atoms: frozenset[Atom],
+    goal: frozenset[Atom],
+    avoided: frozenset[Atom],
+    longest: int,
 ) -> tuple[TaskPlan, float]:
     """Return `plan_without`, and the processor's seconds that it took (a loaded machine makes no difference)."""
     start = time.thread_time()
-    outcome = plan_without(domain, objects, atoms, goal, avoided)
+    outcome = plan_without(domain, objects, atoms, goal, avoided, longest)
     return outcome, time.thread_time() - start
 
 
 def plan_without(
-    domain: Domain, objects: list[str], atoms: frozenset[Atom], goal: frozenset[Atom], avoided: frozenset[Atom]
+    domain: Domain,
+    objects: list[str],
+    atoms: frozenset[Atom],
+    goal: frozenset[Atom],
+    avoided: frozenset[Atom],
+    longest: int,
 ) -> TaskPlan:
-    """Return a plan that begins with no action that has just failed, where there is one; else any plan."""
+    """Return a plan without actions that have just failed, where there is one; else any plan. One of at most `longest`
+    actions is looked for."""
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
     actions = ground(domain, problem)
-    if avoided:
-        without_avoided = plan_task(
-            problem, [a for a in actions if action_atom(a) not in avoided], limit=PLANNING_LIMIT, improvement=SHORTENING
-        )
-        if without_avoided.actions:
-            return without_avoided
-    return plan_task(problem, actions, limit=PLANNING_LIMIT, improvement=SHORTENING)
+    allowed_actions = [action for action in actions if action_atom(action) not in avoided]
+    outcome = plan_task(problem, allowed_actions, limit=PLANNING_LIMIT, improvement=SHORTENING, longest=longest)
+    if not outcome.actions and avoided:
+        outcome = plan_task(problem, actions, limit=PLANNING_LIMIT, improvement=SHORTENING, longest=longest)
+    return outcome
 
 
 def fast_downward_plan(
-    domain: Domain, objects: list[str], atoms: frozenset[Atom], goal: frozenset[Atom], avoided: frozenset[Atom]
+    domain: Domain,
+    objects: list[str],
+    atoms: frozenset[Atom],
+    goal: frozenset[Atom],
+    avoided: frozenset[Atom],
+    longest: int,
 ) -> tuple[TaskPlan, float]:
-    """Return a plan by Fast Downward as `timed_plan` does; what can't be reached is found by our own heuristic. Raises
-    as `plan_with_fast_downward` does."""
+    """Return a plan by Fast Downward as `timed_plan` does, of whatever length; what can't be reached is found by our
+    own heuristic. Raises as `plan_with_fast_downward` does."""
     start = time.thread_time()
     problem = Problem("task", dict.fromkeys(objects, ""), atoms, goal)
     actions = ground(domain, problem)

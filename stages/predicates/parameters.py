@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
@@ -42,8 +43,8 @@ class PlanParameters(Parameters):
     goal: str = Field(
         "", description='What is wanted, e.g. "stack bread on plate and put cup on the table"; else that of the task'
     )
-    which: SetName = Field("combined", description="Set of tasks that the kitchen is taken from")
-    task: int = Field(1, ge=1, le=1000, description="Which of them")
+    which: SetName = Field("combined", description="Set of tasks that the kitchen is taken from, without --tasks")
+    task: int = Field(1, ge=1, le=1000, description="Which of them; of --tasks, counted through its files by path")
     planner: Literal["builtin", "fast-downward"] = Field(
         "builtin", description="Task planner; fast-downward is a program of its own (extra planning-gpl)"
     )
@@ -53,8 +54,11 @@ class PlanParameters(Parameters):
 class EvaluateParameters(Parameters):
     """Options of `predicates evaluate`."""
 
-    sets: tuple[str, ...] = Field(("canonical", "more_objects", "novel_goals", "combined"), description="Sets of tasks")
-    tasks: int = Field(10, ge=1, le=200, description="Tasks of each")
+    sets: tuple[str, ...] = Field(
+        ("canonical", "more_objects", "novel_goals", "combined"),
+        description="Sets of tasks, without the option --tasks",
+    )
+    each: int = Field(10, ge=1, le=200, description="Tasks of each set, or of --scene")
     states: int = Field(1000, ge=10, le=20_000, description="States that each predicate is judged on")
 
 
@@ -65,8 +69,18 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
 
 
 def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
-    """Raise UsageError for an unknown set."""
+    """Raise UsageError for an unknown set, and as `check_tasks` does."""
+    check_tasks(parameters, inputs)
     check_names("--sets", parameters.sets, SET_NAMES)
+
+
+def check_tasks(parameters: Any, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for a number of tasks where a folder is wanted, and for tasks and rooms together."""
+    given = inputs.get("tasks")
+    if given is not None and str(given).isdigit() and not Path(str(given)).exists():
+        raise UsageError(f"--tasks {given}: it takes a folder of tasks", hint=f"how many of each set: --each {given}")
+    if given is not None and inputs.get("scene") is not None:
+        raise UsageError("--tasks are the kitchen's, --scene is of rooms", hint="leave --scene or --tasks out")
 
 
 def kitchen_files(parameters: Any) -> tuple[str, ...]:
@@ -82,6 +96,7 @@ def kitchen_files(parameters: Any) -> tuple[str, ...]:
     )
 
 
+TASKS = External("tasks of your own instead of drawn ones: JSON files of {name: {objects, goal_text, goal_lits_gt}}")
 TEACH = Stage(
     name="predicates teach",
     summary="Learn predicates and operators from a simulated teacher's corrections in a planar kitchen",
@@ -102,7 +117,7 @@ PLAN = Stage(
     name="predicates plan",
     summary="Plan for a goal in words with what was learned, and try it in the kitchen",
     parameters=PlanParameters,
-    reads={"learned": LearnedDomain},
+    reads={"learned": LearnedDomain, "tasks": Optionally(TASKS)},
     writes=KitchenPlan,
     libraries=(*LIBRARIES, "pillow"),
     module="plan_stage",
@@ -114,7 +129,11 @@ EVALUATE = Stage(
     name="predicates evaluate",
     summary="Count what is reached of sets of tasks with what was learned, beside the teacher's own operators",
     parameters=EvaluateParameters,
-    reads={"learned": LearnedDomain, "scene": Optionally(External("rooms to try in what was learned in rooms"))},
+    reads={
+        "learned": LearnedDomain,
+        "scene": Optionally(External("rooms to try in what was learned in rooms")),
+        "tasks": Optionally(TASKS),
+    },
     writes=KitchenEvaluation,
     libraries=LIBRARIES,
     module="evaluate_stage",

@@ -26,16 +26,18 @@ FRUITLESS = 40
 
 @dataclass(frozen=True)
 class Task:
-    """Objects at (middle x, bottom y), what is wanted, and the seed of the kitchen's chance."""
+    """Objects at (middle x, bottom y), what is wanted, the seed of the kitchen's chance, and the goal as somebody said
+    it (empty: nobody did)."""
 
     name: str
     objects: dict[str, tuple[float, float]]
     goal: tuple[Atom, ...]
     seed: int
+    said: str = ""
 
     @property
     def sentence(self) -> str:
-        """The goal in words."""
+        """The goal in the teacher's words."""
         return " and ".join(map(truth_of(self.name.split("/")[0]).goal_phrase, self.goal))
 
 

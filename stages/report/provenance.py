@@ -123,8 +123,9 @@ def _files(artifact: Artifact, report_folder: Path, most: int = 12) -> tuple[Pay
     top = sorted(names, key=lambda p: (len(p.relative_to(artifact.root).parts), -p.stat().st_size))[:most]
     return tuple(
         Payload(
-            str(p.relative_to(artifact.root)),
-            quote(os.path.join(base, p.relative_to(artifact.root))),
+            # A name that is no UTF-8 is shown by its bytes (`\\xff`), and so linked.
+            os.fsencode(p.relative_to(artifact.root)).decode("utf-8", "backslashreplace"),
+            quote(os.fsencode(os.path.join(base, p.relative_to(artifact.root)))),
             _size(p.stat().st_size),
         )
         for p in top

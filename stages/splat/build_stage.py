@@ -49,16 +49,14 @@ def run(
             else:
                 views.append(view)
         if not views:
-            raise BadInput(
-                f"{sequence.root}: all {len(learned_frames)} pictures are dark", hint="look at it: scenewright inspect"
-            )
+            raise BadInput(f"{sequence.root}: all {len(learned_frames)} pictures are dark", hint="record in more light")
         if all(view.depth is None or not view.depth.any() for view in views):
             with context.progress.step("points"):
                 views = with_points(views, context.seed)
             if not any(view.depth is not None and view.depth.any() for view in views):
                 raise BadInput(
                     f"{sequence.root}: no picture has depth, and no feature is seen from two places",
-                    hint="record depth, or pictures that overlap; are the poses right? scenewright inspect",
+                    hint="record depth, or pictures that overlap; scenewright inspect LOG checks the poses",
                 )
         cameras = {view.camera_name: view.camera for view in views}
         trainer = Trainer(

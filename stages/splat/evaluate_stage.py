@@ -34,6 +34,8 @@ class First:
     right: bool
     place: np.ndarray | None
     """(3,) [m]"""
+    unknown: bool = False
+    """Whether the encoder cannot say that it is not there."""
 
 
 def run(
@@ -54,7 +56,8 @@ def run(
         position = None if first_answer is None else finder.place(first_answer.region)
         right = position is not None and any(points_in_box(box, position[None], MARGIN)[0] for box in boxes)
         chance = 0.0 if first_answer is None else round(first_answer.probability, 6)
-        firsts.append(First(text, number < len(questions.there), chance, bool(right), position))
+        known_there = number < len(questions.there)
+        firsts.append(First(text, known_there, chance, bool(right), position, finder.cannot_tell(text)))
     least = parameters.least_probability
     file = MetricsFile(label=encoder.label, metrics=figures(firsts, least), notes=_notes(finder, firsts))
     file.write(context.output / "metrics.json")
@@ -104,7 +107,8 @@ def answers_table(firsts: list[First], least: float) -> Table:
     rows = []
     for first in firsts:
         answered = first.probability >= least
-        verdict = ("right" if first.right else "wrong") if answered else ("missed" if first.there else "rejected")
+        none = "unknown" if first.unknown else "missed" if first.there else "rejected"
+        verdict = ("right" if first.right else "wrong") if answered else none
         rows.append(
             (
                 first.text,
@@ -115,7 +119,10 @@ def answers_table(firsts: list[First], least: float) -> Table:
             )
         )
     columns = ("text", "there", "probability", "answer", "x [m]", "y [m]", "z [m]")
-    note = f"An answer counts from probability {least:g} on; nothing that is not there has a right one."
+    note = (
+        f"An answer counts from probability {least:g} on; nothing that is not there has a right one; "
+        "unknown: below it, of words or pictures that the encoder has never learned."
+    )
     return Table("answers", "First answers", columns, tuple(rows), note)
 
 

@@ -25,7 +25,8 @@ def run(
     parameters: QueryParameters,
     context: Context,
 ) -> Answers:
-    """Rank the places that fit a text. The outcome is `absent` where none is likely enough.
+    """Rank the places that fit a text. Where none is likely enough the outcome is `absent`, or `unknown` of words or
+    pictures that the encoder has never learned.
 
     Raises BadInput for an encoder other than that of the map, or for a contact graph of another map.
     """
@@ -45,7 +46,8 @@ def run(
     likely = [answer for answer in ranking if answer.probability >= least][: parameters.most]
     below = next((answer for answer in ranking if answer.probability < least), None)
     masks = [finder.index.members(answer.region) for answer in likely]
-    unread = encoder.unread(text)
+    parts = (text,) if relation is None else (relation[0], relation[2])
+    unread = tuple(word for part in parts for word in encoder.unread(part))
     AnswersFile(
         text=text,
         encoder=encoder.label,
@@ -68,15 +70,18 @@ def run(
     if finder.is_strange:
         context.logger.warning(
             "its pictures are near nothing that the encoder has learned (%.2f, from %.2f on they count as known): "
-            "answers would be guesses; --least-probability 0 shows them, --encoder names other encoders",
+            "answers %s; a map that is made with another --encoder may tell more",
             finder.recognised,
             finder.calibration.least_recognised,
+            "are guesses" if likely else "would be guesses, which --least-probability 0 shows",
         )
         summary["strange"] = True
     if unread:
-        context.logger.warning("the encoder has never read %s: what is found for it is a guess", ", ".join(unread))
+        found_for_it = "what is found for it is a guess" if likely else "whether it is there is unknown"
+        context.logger.warning("the encoder has never read %s: %s", ", ".join(unread), found_for_it)
         summary["unread"] = " ".join(unread)
-    return Answers(context.output, outcome="ok" if likely else "absent", summary=summary)
+    none = "unknown" if finder.cannot_tell(*parts) else "absent"
+    return Answers(context.output, outcome="ok" if likely else none, summary=summary)
 
 
 def _check_same_map(language: LanguageMap, graph: ContactGraphFile) -> None:

@@ -12,9 +12,9 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
-from scenewright.stages.kit.formats.trajectories import read_tum
 from scenewright.stages.kit.geometry.cameras import scaled
 from scenewright.stages.kit.geometry.transforms import inverse
+from scenewright.stages.kit.own_trajectory import frame_poses
 
 DARK = 0.02
 """Mean brightness, of 1, below which a picture shows nothing."""
@@ -50,22 +50,13 @@ def posed_frames(
     if trajectory is None:
         frames, poses = reader.poses()
         posed = list(zip(frames.tolist(), poses, strict=True))
-        hint = "estimate poses: scenewright poses"
+        hint = "estimate them with scenewright poses, and give --trajectory"
     else:
-        posed, hint = _of_trajectory(reader, trajectory), "the trajectory belongs to another sequence"
+        of_frames = frame_poses(trajectory, sequence, reader, TIME_TOLERANCE)
+        posed = [(frame, pose) for frame, pose in enumerate(of_frames) if pose is not None]
+        hint = "the trajectory belongs to another sequence"
     if len(posed) < 2:
         raise BadInput(f"{sequence.root}: {len(posed)} frames have a pose, two are needed", hint=hint)
-    return posed
-
-
-def _of_trajectory(reader: FrameReader, trajectory: Trajectory) -> list[tuple[int, np.ndarray]]:
-    times, poses = read_tum(trajectory.path("trajectory.tum"))
-    posed = []
-    for frame, time in enumerate(reader.times):
-        if len(times):
-            nearest = int(np.abs(times - time).argmin())
-            if abs(times[nearest] - time) <= TIME_TOLERANCE:
-                posed.append((frame, poses[nearest]))
     return posed
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 SEED_OF_MASKS = 5
 """First number of the seed from which masks are spoiled."""
 BUNDLED = data_file(CHECKPOINT)
-OTHER_MASKS = "--segmentation spoiled, or --masks FOLDER"
+OTHER_MASKS = "give --masks FOLDER instead"
 DRIVER_GROWTH = 5
 """Side [px] of the square by which learned masks of drivers grow: their rims hide the needle too."""
 WHITE = 255
@@ -120,7 +120,7 @@ def _true_eyes(sequence: Sequence, size: tuple[int, int]) -> Callable[[Pair], tu
     if not isinstance(sequence, SutureScene):
         raise BadInput(
             f"{sequence.root}: no masks: a {sequence.kind!r} has no truth to take them from",
-            hint="give --masks FOLDER or --segmenter CHECKPOINT",
+            hint="leave --segmentation out: the shipped network finds them, or your --masks FOLDER",
         )
     views, folder = sequence.truth.views, sequence.path("truth")
 
@@ -187,13 +187,14 @@ def learned_masks(left: Masks, right: Masks) -> EyeMasks:
     return EyeMasks((left.needle, right.needle), (left.thread, right.thread), hidden)  # type: ignore[arg-type]
 
 
-def open_segmenter(checkpoint: Path | None) -> Any:
-    """Return the segmenter of a checkpoint, or of the one in data/. Raises MissingDependency without one."""
+def open_segmenter(checkpoint: Path | None, instead: str = OTHER_MASKS) -> Any:
+    """Return the segmenter of a checkpoint, or of the one in data/. Raises MissingDependency without one, saying what
+    does `instead`."""
     try:
         infer = importlib.import_module("scenewright.stages.suture.segmentation.infer")
     except ImportError as error:
-        raise MissingDependency(f"the learned segmenter cannot be loaded: {error}", hint=OTHER_MASKS) from None
+        raise MissingDependency(f"the learned segmenter cannot be loaded: {error}", hint=instead) from None
     path = checkpoint if checkpoint is not None else BUNDLED
     if not path.is_file():
-        raise MissingDependency(f"{path}: there is no checkpoint of the segmenter", hint=OTHER_MASKS)
+        raise MissingDependency(f"{path}: there is no checkpoint of the segmenter", hint=instead)
     return infer.Segmenter.load(path)

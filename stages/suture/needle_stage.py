@@ -145,7 +145,8 @@ def _motion(sequence: Sequence, parameters: NeedleParameters, frames: int) -> st
         return "kinematics" if reported else "none"
     if parameters.filter == "kinematics" and not reported:
         raise BadInput(
-            f"{sequence.root}: it reports no motion of the needle between frames", hint="--filter still, or none"
+            f"{sequence.root}: it reports no motion of the needle between frames",
+            hint="--filter still for a needle at rest, else --filter none",
         )
     return parameters.filter
 

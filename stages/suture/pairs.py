@@ -41,8 +41,6 @@ class StereoPairs:
 
     def __init__(self, sequence: Sequence) -> None:
         self._where = sequence.root
-        if not sequence.path("frames.mcap").is_file():
-            raise BadInput(f"{sequence.root}: frames.mcap is missing", hint="make the sequence again")
         self._reader = FrameReader(sequence.path("frames.mcap"))
         try:
             self.camera_name, self.camera, self.baseline = self._open()

@@ -99,11 +99,13 @@ def check_needle(parameters: NeedleParameters, inputs: Mapping[str, Any]) -> Non
     """Raise UsageError for options and inputs that do not go together."""
     check_masks(parameters, inputs)
     if parameters.fit_radius and parameters.estimator != "ours":
-        raise UsageError(f"--fit-radius is not for --estimator {parameters.estimator}", hint="--needle-radius METRES")
+        raise UsageError(
+            f"--fit-radius is not for --estimator {parameters.estimator}", hint="give --needle-radius METRES instead"
+        )
     if parameters.estimator in NEED_DISPARITY and inputs.get("disparity") is None:
         raise UsageError(
             f"--estimator {parameters.estimator} needs --disparity",
-            hint="scenewright disparity --sequence SCENE --out FOLDER",
+            hint="make it: scenewright disparity --sequence SCENE --out FOLDER",
         )
 
 

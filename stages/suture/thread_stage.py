@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import textwrap
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
-from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.suture_needle import SutureNeedle, SutureThread, SutureThreadFile, ThreadFrame
 from scenewright.stages.kit.stage import Context
@@ -20,6 +18,7 @@ from scenewright.stages.suture.needle.records import as_estimate
 from scenewright.stages.suture.pairs import Pair, StereoPairs
 from scenewright.stages.suture.parameters import ThreadParameters
 from scenewright.stages.suture.rig import StereoRig
+from scenewright.stages.suture.thread.reconstruct import reconstruct_thread
 
 WIDTH = 720
 """Width of each eye's picture [px]."""
@@ -39,7 +38,6 @@ def run(
 
     The outcome is `not_traced` when no frame has a curve.
     """
-    reconstruct = _reconstruction()
     starts = _starts(needle)
     frames: list[ThreadFrame] = []
     curves: dict[str, np.ndarray] = {}
@@ -50,10 +48,10 @@ def run(
         for pair in context.progress.track(pairs, total=len(pairs), description="threads"):
             eye_masks = make(pair)
             start = starts.get(pair.index)
-            curve = reconstruct(*eye_masks.thread, pairs.rig, start=start)
+            curve = reconstruct_thread(*eye_masks.thread, pairs.rig, start=start)
             remarks = tuple(str(remark) for remark in curve.remarks)
             if start is not None and not len(curve.points):
-                curve = reconstruct(*eye_masks.thread, pairs.rig, start=None)
+                curve = reconstruct_thread(*eye_masks.thread, pairs.rig, start=None)
                 remarks = (*remarks, *(str(remark) for remark in curve.remarks))
             points = np.asarray(curve.points, dtype=float).reshape(-1, 3)
             if len(points):
@@ -92,14 +90,6 @@ def run(
     if not traced:
         summary["reason"] = statement
     return SutureThread(root=context.output, outcome="ok" if traced else "not_traced", summary=summary)
-
-
-def _reconstruction() -> Any:
-    """Return the function that makes a curve of two masks. Raises MissingDependency without its module."""
-    try:
-        return importlib.import_module("scenewright.stages.suture.thread.reconstruct").reconstruct_thread
-    except ImportError as error:
-        raise MissingDependency(f"threads cannot be reconstructed: {error}", hint="scenewright doctor") from None
 
 
 def _starts(needle: SutureNeedle | None) -> dict[int, np.ndarray]:

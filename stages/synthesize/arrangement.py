@@ -14,6 +14,7 @@ from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.synthesize.collision import CollisionWorld, PlacedShape, box_shape
 from scenewright.stages.synthesize.furniture import Catalogue, Furnishing, main_joint
 from scenewright.stages.synthesize.less_common import across_two, beside_its_like, from_ceiling, leaning
+from scenewright.stages.synthesize.parameters import OTHER_ROOM
 from scenewright.stages.synthesize.placement import Hanging, PlacedObject, Pose
 from scenewright.stages.synthesize.recipes import CLUTTER_FACTOR, Place, Recipe
 from scenewright.stages.synthesize.shell import Room, build_room
@@ -85,10 +86,7 @@ def arrange(
             reasons.append(refused)
         except _Impossible as reason:
             reasons.append(str(reason))
-    raise BadInput(
-        f"no room found for seed {seed} in {RESTARTS} starts; last: {reasons[-1]}",
-        hint="take another --seed or a lower --clutter",
-    )
+    raise BadInput(f"no room found for seed {seed} in {RESTARTS} starts; last: {reasons[-1]}", hint=OTHER_ROOM)
 
 
 class _Arranger:

@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scenewright.stages.synthesize.free_space import FreeSpace
+from scenewright.stages.synthesize.parameters import OTHER_ROOM
 from scenewright.stages.synthesize.walk import (
     CLEARANCE,
     GAZE_SMOOTHING,
@@ -52,7 +53,7 @@ def plan_drive(
     closest = float(renderer.distance(eye).min())
     if closest < CLEARANCE:
         raise BadInput(
-            f"the camera would come within {closest:.2f} m of a surface", hint="take another --seed or --path"
+            f"the camera would come within {closest:.2f} m of a surface", hint=f"{OTHER_ROOM}, or another --path"
         )
     ahead = np.gradient(gaussian_filter1d(eye[:, :2], 0.25 * RATE, axis=0, mode="nearest"), axis=0)
     yaw = gaussian_filter1d(np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0])), GAZE_SMOOTHING * RATE, mode="nearest")
@@ -64,7 +65,7 @@ def _floor_path(shape: Shape, space: FreeSpace) -> np.ndarray:
     nodes = _ends(space) if shape == "line" else _around(shape, space)
     legs = [space.path(a, b) for a, b in zip(nodes, nodes[1:], strict=False) if a != b]
     if not legs:
-        raise BadInput("there is no floor to drive on", hint="take another --seed or a lower --clutter")
+        raise BadInput("there is no floor to drive on", hint=OTHER_ROOM)
     points = np.concatenate([legs[0][:1], *(leg[1:] for leg in legs)])
     return resample(points, np.array([0]))[0]
 

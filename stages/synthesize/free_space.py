@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
+from scenewright.stages.synthesize.parameters import OTHER_ROOM
 from scipy.ndimage import map_coordinates
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
@@ -70,7 +71,7 @@ def find_free_space(renderer: SceneRenderer, room_size: np.ndarray) -> FreeSpace
     clearance = np.min(levels, axis=0)
     free = clearance >= BODY_RADIUS
     if not free.any():
-        raise BadInput("there is no floor to walk on", hint="take another --seed or a lower --clutter")
+        raise BadInput("there is no floor to walk on", hint=OTHER_ROOM)
     graph, node = _grid_graph(free, clearance)
     _, labels = connected_components(graph, directed=False)
     largest = np.bincount(labels).argmax()

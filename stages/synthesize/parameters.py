@@ -12,6 +12,9 @@ from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
 from scenewright.stages.kit.stage import Parameters, Stage
 
+OTHER_ROOM = "take another --seed or a lower --clutter"
+"""What helps where a room cannot be furnished, or a camera not be moved through it."""
+
 
 class SynthesizeParameters(Parameters):
     """How the room is made and recorded. The room itself depends on the recipe, the clutter and the seed alone."""
@@ -65,7 +68,10 @@ def check(parameters: SynthesizeParameters, inputs: Mapping[str, Any]) -> None:
     if parameters.rounds > 1 and parameters.path == "tour":
         raise UsageError("a tour has no rounds", hint="give --path line, loop or eight")
     if not parameters.depth and parameters.stereo_baseline == 0:
-        raise UsageError("--no-depth leaves a log without distances", hint="give --stereo-baseline 0.12, for example")
+        raise UsageError(
+            "--no-depth leaves a log without distances",
+            hint="give --stereo-baseline 0.12, for example, or leave --no-depth out",
+        )
 
 
 def _estimate(parameters: SynthesizeParameters, inputs: Inputs) -> Estimate:

@@ -10,7 +10,8 @@ from scenewright.schemas.cad_library import CadLibrary
 from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import LabelEntry
-from scenewright.stages.kit.formats.frames import CAMERA_FRAME, FrameWriter
+from scenewright.stages.kit.formats.frame_streams import CAMERA_FRAME
+from scenewright.stages.kit.formats.frames import FrameWriter
 from scenewright.stages.kit.formats.scene_bundle import write_scene_bundle
 from scenewright.stages.kit.formats.trajectories import write_tum
 from scenewright.stages.kit.geometry.transforms import transform_from

@@ -9,6 +9,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.geometry.transforms import look_at, transform_from
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scenewright.stages.synthesize.free_space import FreeSpace
+from scenewright.stages.synthesize.parameters import OTHER_ROOM
 from scenewright.stages.synthesize.viewpoints import View
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse.csgraph import dijkstra
@@ -160,7 +161,7 @@ def plan_walk(
     Raises BadInput when there is nothing to look at or the camera would come closer than CLEARANCE to a surface.
     """
     if not views:
-        raise BadInput("there is nothing that the camera could look at", hint="take another --seed")
+        raise BadInput("there is nothing that the camera could look at", hint=OTHER_ROOM)
     views = order_views(views, space)
     points, marks = [views[0].eye[None, :2]], [0]
     total = 1
@@ -197,7 +198,7 @@ def plan_walk(
     walk = Walk(eye, yaw, pitch, draw_tremor(random))
     closest = float(renderer.distance(eye).min())
     if closest < CLEARANCE:
-        raise BadInput(f"the camera would come within {closest:.2f} m of a surface", hint="take another --seed")
+        raise BadInput(f"the camera would come within {closest:.2f} m of a surface", hint=OTHER_ROOM)
     return walk
 
 

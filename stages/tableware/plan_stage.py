@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image
-from scenewright.schemas.errors import BadInput
 from scenewright.schemas.tableware_detections import TablewareDetections
 from scenewright.schemas.tableware_plan import TablewarePlan, TablewarePlanFile, TablewareStep
 from scenewright.schemas.tableware_scene import TablewareScene
@@ -115,7 +114,7 @@ class Understood:
 def _understand_table(
     detections: TablewareDetections | None, scene: TablewareScene | None, parameters: PlanParameters, context: Context
 ) -> Understood:
-    """Return what is planned for. Raises BadInput for what cannot be planned from."""
+    """Return what is planned for."""
     least = parameters.least_confidence
     if detections is not None:
         payload = detections.info
@@ -129,8 +128,7 @@ def _understand_table(
         if seen_so != setting:
             notes = (*notes, FROM_THE_SIDE)
         return Understood(understood(detected, least, seen_so), notes, seen_so, payload.sizes)
-    if scene is None:
-        raise BadInput("tableware plan: nothing to plan from", hint="give --detections, or --scene")
+    assert scene is not None  # the declaration asks for one of the two
     setting = setting_of(scene.info.dishes)
     notes = () if setting == Setting() else (OTHER_SETTING,)
     if parameters.source == "truth":

@@ -232,7 +232,7 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
         ("poses.txt", UNIT + "1 2\n", "2 columns, expected 12"),
         ("times.txt", "0\n", "1 times for 2 images"),
         ("times.txt", "0\nnan\n", "not between"),
-        ("times.txt", "0\nsoon\n", "not a number"),
+        ("times.txt", "0\nsoon\n", "is no time stamp"),
     ],
     "images, no calibration": [
         ("intrinsics.txt", "80 80", "2 numbers"),
@@ -259,7 +259,8 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
     ],
     "nothing": [
         *[("transforms.json", text, "transforms.json") for text in ("", "{", "[1, 2]", "[" * 200_000)],
-        *[(name, "something", "is not a log in a format") for name in ("notes.txt", "model.ply", ".hidden.png")],
+        *[(name, "something", "is not a log in a format") for name in ("notes.txt", ".hidden.png")],
+        ("model.ply", "something", "is a scan"),
     ],
 }
 """Layout -> (the file, what is done to it, the words of the refusal)."""

@@ -24,7 +24,16 @@ from scenewright.schemas.scene_parts import Joint
 from scenewright.stages.kit.formats import mesh_files
 from scenewright.stages.kit.formats.xml_files import parse_xml
 from scenewright.stages.kit.geometry.solids import box
-from scenewright.stages.library.importing import collada_file, limits, mesh_reading, mjcf_models, pictures, pieces
+from scenewright.stages.library.importing import (
+    collada_file,
+    gltf_reading,
+    limits,
+    mesh_reading,
+    mjcf_document,
+    obj_reading,
+    pictures,
+    pieces,
+)
 from scenewright.stages.library.importing.assembly import MOST_SECTIONS_CLOSED, _unique_names
 from scenewright.stages.library.importing.discovery import find_models
 from scenewright.stages.library.importing.mapping import read_mapping
@@ -116,7 +125,7 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
     ),
     "ellipsoid as flat as a sheet": (
         {"chair.xml": mjcf('<geom type="ellipsoid" size="1 1 1e-16"/>')},
-        "chair.*cannot be used: QhullError",
+        "chair.*a shape has no volume",
     ),
     "includes that multiply": (
         {f"p{k}.xml": "<mujocoinclude>" + f'<include file="p{k + 1}.xml"/>' * 4 + "</mujocoinclude>" for k in range(5)}
@@ -193,7 +202,7 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
         {"chair.obj": "v 0 0 0\nv 1 0 0\nv 0 1 1\n" + "".join(f"g {k}\nf 1 2 3\n" for k in range(3000))},
         "chair.*(groups|triangles)",
     ),
-    "a line without end": ({"chair.obj": CUBE + "x" * (mesh_reading.LONGEST_LINE + 1)}, "chair.*a line of"),
+    "a line without end": ({"chair.obj": CUBE + "x" * (obj_reading.LONGEST_LINE + 1)}, "chair.*a line of"),
     "a length that is infinite": (
         {"chair.gltf": json.dumps(BUFFERED).replace("3}", "1e999}")},
         "chair.*no whole number",
@@ -234,15 +243,16 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
 @pytest.fixture
 def small_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bounds of a thousandth: what is beyond them is as it is beyond the real ones."""
-    for module in (limits, mesh_reading):
+    for module in (limits, mesh_reading, obj_reading, gltf_reading):
         monkeypatch.setattr(module, "MOST_TRIANGLES", 2000)
     monkeypatch.setattr(
         limits.Allowance.__init__, "__kwdefaults__", {"triangles": 2000, "vertices": 6000, "shapes": 1000}
     )
     monkeypatch.setattr(collada_file, "MOST_STEPS", 20_000)
-    monkeypatch.setattr(mesh_reading, "MOST_SHAPES", 1000)
-    monkeypatch.setattr(mesh_reading, "LARGEST_FILE", 50_000)
-    monkeypatch.setattr(mjcf_models, "MOST_ELEMENTS", 2000)
+    for module in (mesh_reading, obj_reading):
+        monkeypatch.setattr(module, "MOST_SHAPES", 1000)
+    monkeypatch.setattr(gltf_reading, "LARGEST_FILE", 50_000)
+    monkeypatch.setattr(mjcf_document, "MOST_ELEMENTS", 2000)
 
 
 @pytest.mark.usefixtures("small_bounds")

@@ -136,6 +136,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/report/page.py": {"read_text": OURS},
     "stages/segment/backends/masks/backend.py": {"open": WORLD},
     "stages/segment/backends/masks/formats/npz_stacks.py": {"zipfile.ZipFile": PARSED},
+    "stages/segment/backends/masks/images.py": {"Image.open": PICTURE},
     "stages/segment/backends/masks/listing.py": {"json.loads": PARSED},
     "stages/segment/backends/network/weights.py": {"json.loads": PARSED},
     "stages/segment/backends/service/reply_cache.py": {"read_bytes": CACHE},

@@ -62,6 +62,30 @@ def lying_run_lengths(root: Path, images: list[np.ndarray]) -> None:
     (root / "m.json").write_text(json.dumps({"images": [{"id": 0}], "annotations": rows, "categories": told}))
 
 
+def boxes_alone(root: Path, images: list[np.ndarray], outlined: tuple[int, ...] = ()) -> None:
+    outline = [[5.0, 5.0, 60.0, 5.0, 60.0, 40.0, 5.0, 40.0]]
+    rows = [
+        {"image_id": k, "category_id": 10, "bbox": [5, 5, 55, 35], "segmentation": outline if k in outlined else []}
+        for k in range(3)
+    ]
+    told = [{"id": 10, "name": "chair"}]
+    listed = [{"id": k, "file_name": f"{k:06d}.jpg"} for k in range(3)]
+    (root / "m.json").write_text(json.dumps({"images": listed, "annotations": rows, "categories": told}))
+
+
+def two_boxes_and_an_outline(root: Path, images: list[np.ndarray]) -> None:
+    boxes_alone(root, images, (1,))
+
+
+def twice_for_a_frame(root: Path, images: list[np.ndarray]) -> None:
+    pictures(root, images)
+    cv2.imwrite(str(root / "000001_jpg.rf.0a1b2c3d4e5f6071.png"), images[1].astype(np.uint8))
+
+
+def ignored_values(root: Path, images: list[np.ndarray]) -> None:
+    pictures(root, [np.where(image == image.max(), 255, image) for image in images])
+
+
 def without_names(root: Path, images: list[np.ndarray]) -> None:
     pictures(root, images, dict.fromkeys(CLASSES, ""))
 
@@ -93,6 +117,8 @@ def command(recorded: tuple[Path, list[np.ndarray]], tmp_path: Path, write: Writ
         (of_frames_that_are_not_there, "1 of 3 masks are of frames that are not there: 000777"),
         (lying_run_lengths, "adds up to"),
         (without_names, "has no name"),
+        (boxes_alone, "its annotations are boxes, none has a mask"),
+        (twice_for_a_frame, "masks of '000001.png' and '000001_jpg.rf.0a1b2c3d4e5f6071.png' are both of frame 1"),
     ],
 )
 def test_masks_that_cannot_be_used(
@@ -110,7 +136,12 @@ def test_masks_that_cannot_be_used(
 
 @pytest.mark.parametrize(
     ("write", "message"),
-    [(of_one_frame, "2 of 3 frames have no masks, the first is 1"), (overlapping, "masks overlap in 3 frames")],
+    [
+        (of_one_frame, "2 of 3 frames have no masks, the first is 1"),
+        (overlapping, "masks overlap in 3 frames"),
+        (two_boxes_and_an_outline, "annotations without a mask"),
+        (ignored_values, "255 (of 16 bits also 65535) is in no list of classes and was taken for no mask in 3 frames"),
+    ],
 )
 def test_masks_that_are_used_all_the_same(
     recorded: tuple[Path, list[np.ndarray]],

@@ -13,9 +13,10 @@ from scenewright.stages.ingest.detection import open_log
 from scenewright.stages.ingest.folders.calibration_files import read_calibration
 from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
 from scenewright.stages.ingest.folders.pose_files import read_pose_list
-from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Unusable
+from scenewright.stages.kit.formats.stamps import exact_stamps
 
 from tests.fuzz.harness import Harness, as_file, chosen, refused, scratch
 from tests.unit.ingest.folder_writers import (
@@ -136,7 +137,8 @@ def pose_list(data: bytes) -> None:
         found = read_pose_list(as_file("poses.txt", data), ["a", "b"])
         assert isinstance(found, StampedPoses) or len(found) == 2
     with refused(BadInput):
-        assert 0 <= exact_stamp(data.decode("utf-8", "replace"), "here") < 9 * 10**18
+        (stamp,) = exact_stamps([data.decode("utf-8", "replace")], ["here"]).stamps
+        assert stamp is not None and 0 <= stamp < 9 * 10**18
 
 
 def _pose_list_seeds() -> dict[str, bytes]:

@@ -348,7 +348,8 @@ EDITS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "payload deleted": (lambda out: (out / "file-3.txt").unlink(), "file-3.txt: missing", "file-3.txt: missing"),
     "file added": (lambda out: (out / "new.txt").write_text("x"), "", "new.txt: not in the manifest"),
     "digest edited": (lambda out: edit_manifest(out, content_digest="0" * 64), "was edited", "does not match"),
-    "manifest deleted": (lambda out: (out / MANIFEST_NAME).unlink(), "not an artifact", "not an artifact"),
+    # without it, a folder with trajectory.tum is a trajectory from elsewhere
+    "manifest deleted": (lambda out: (out / MANIFEST_NAME).unlink(), "", "not an artifact"),
     "manifest empty": (lambda out: (out / MANIFEST_NAME).write_text(""), "manifest.json", "manifest.json"),
     "manifest torn": (
         lambda out: (out / MANIFEST_NAME).write_bytes((out / MANIFEST_NAME).read_bytes()[:300]),

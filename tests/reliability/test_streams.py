@@ -134,7 +134,7 @@ NOBODY = (
 """Starts a command as somebody of whom the system knows nothing, not even a home, and who may read all and write
 nothing of the program."""
 GOLDEN = REPOSITORY / "tests" / "golden"
-FUSE = ("fuse", "--sequence", GOLDEN / "v2" / "sequence", "--segments", GOLDEN / "v1" / "segments")
+FUSE = ("fuse", "--sequence", GOLDEN / "v3" / "sequence", "--segments", GOLDEN / "v1" / "segments")
 
 
 @pytest.mark.parametrize(

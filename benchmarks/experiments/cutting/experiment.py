@@ -83,8 +83,8 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Run]
 def grown(learned: Learned, wanted: int, seed: int) -> Run:
     """Return a plan of so many cubes out of a loaf, asked for in words."""
     objects = [make_food("bread", np.random.default_rng(seed))]
-    items, _ = imagine(objects, [(wanted, "cubes")], learned.grammar)
-    carving = carry_out(learned.policy_for(items), objects, most=wanted + 1)
+    wish = imagine(objects, [(wanted, "cubes")], learned.grammar)
+    carving = carry_out(learned.policy_for(wish), objects, most=wanted + 1)
     error = abs(len(carving.board) - wanted)
     return Run(error == 0, error, carving.seconds)
 

@@ -42,7 +42,7 @@ window.addEventListener("scenewright-ready", function () {
       list.append(row);
     }
     fill(frames, new Float32Array(points), new Uint8Array(colors));
-    const words = [told.answers.length ? `${told.answers.length} of “${told.text}”` : `The room has no “${told.text}”.`];
+    const words = [told.answers.length ? `${told.answers.length} of “${told.text}”` : told.unknown ? `Whether the room has “${told.text}” is unknown.` : `The room has no “${told.text}”.`];
     if (!told.answers.length && told.next_best) words.push(`Nearest: ${told.next_best.probability.toFixed(2)} at ${told.next_best.center.map((v) => v.toFixed(2)).join(", ")} m.`);
     if (told.unread.length) words.push(`Never read: ${told.unread.join(", ")}.`);
     if (told.strange) words.push("The encoder has learned no pictures like these: hardly anything is believed.");

@@ -60,6 +60,7 @@ class Asking:
             "answers": [self._place(candidate) for candidate in answers],
             "next_best": None if below is None else self._place(below),
             "unread": list(finder.encoder.unread(text)),
+            "unknown": not answers and finder.cannot_tell(text),
             "calibrated": finder.calibration.fitted,
             "strange": finder.is_strange,
             "milliseconds": round(1e3 * seconds, 1),

@@ -72,7 +72,8 @@ def read_demonstrations(artifact: CuttingDemonstrations, *, only: int | None = N
         raise BadInput(f"{path}: {len(bodies)} objects, the trials have others", hint="make the artifact again")
     if only is not None and only >= len(records):
         raise BadInput(
-            f"{artifact.root}: has {len(records)} trials, none of number {only}", hint="take another --trial"
+            f"{artifact.root}: has {len(records)} trials, none of number {only}",
+            hint=f"give --trial 0 to {len(records) - 1}",
         )
     demonstrations, first = [], 0
     for number, record in enumerate(records):

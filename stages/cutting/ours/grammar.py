@@ -24,6 +24,8 @@ MOST_TYPES = 12
 """Most types that are tried; by eye."""
 LEAST_DEVIATION = 0.05
 """Least standard deviation of a logarithm of an edge within a type; by eye."""
+PIECES_OF_TYPE = 4
+"""Pieces that a type has on average at least; by eye."""
 AXES = 3
 """Axes along which a rule may cut."""
 
@@ -121,12 +123,15 @@ class _Corpus:
 def learn(demonstrations: Sequence[Demonstration], seed: int) -> Grammar:
     """Return types and rules. Demonstrations that stop midway teach their cuts, but not what fragments are called.
 
-    Raises ValueError where nothing was cut.
+    Raises ValueError where too little was cut for one type.
     """
     corpus = _corpus(demonstrations)
     if len(corpus.cuts) == 0:
         raise ValueError("no demonstration cuts anything")
-    tried = [_fit(corpus, count, seed) for count in range(1, min(MOST_TYPES, len(corpus.pieces) // 4) + 1)]
+    if len(corpus.pieces) < PIECES_OF_TYPE:
+        raise ValueError(f"{len(corpus.pieces)} pieces, whole ones too; at least {PIECES_OF_TYPE} are needed")
+    most = min(MOST_TYPES, len(corpus.pieces) // PIECES_OF_TYPE)
+    tried = [_fit(corpus, count, seed) for count in range(1, most + 1)]
     best = min(tried, key=lambda grammar: grammar.bits)
     return _with_names(best, demonstrations)
 

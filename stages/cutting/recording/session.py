@@ -21,7 +21,7 @@ GAP = 0.008
 """Distance by which what was cut is pushed apart [m]; by eye."""
 CELL = "n1m1"
 """Cell of the thesis's table: one object, one category."""
-HINT = "give the file of a recording (scenewright cutting record FILE)"
+HINT = "give a file that scenewright cutting record FILE wrote"
 LYING = transform_from(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]), np.zeros(3))
 """Spine along x, shortest edge up."""
 LARGEST = 16 * 2**20

@@ -8,6 +8,10 @@ from functools import cached_property
 
 import manifold3d
 import numpy as np
+from scenewright.stages.kit.geometry.transforms import transform_from
+
+DUST = 1e-12
+"""Volume [m^3] up to which a piece is none: a thousandth of a cubic millimetre."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +39,12 @@ class Plane:
 
 
 class Body:
-    """A closed body of one piece, in metres. Cutting and moving give new bodies."""
+    """A closed body of one piece, in metres. Cutting and moving give new bodies, which know how they were moved."""
 
-    def __init__(self, solid: manifold3d.Manifold) -> None:
+    def __init__(self, solid: manifold3d.Manifold, world_from_first: np.ndarray | None = None) -> None:
         self.solid = solid
+        self.world_from_first = np.eye(4) if world_from_first is None else world_from_first
+        """Rigid (4, 4), from where the mesh lay out of which it was made or cut."""
 
     @staticmethod
     def of_mesh(vertices: np.ndarray, faces: np.ndarray) -> Body:
@@ -95,16 +101,28 @@ class Body:
 
     def moved(self, target_from_source: np.ndarray) -> Body:
         """Return the body under a rigid (4, 4) transform."""
-        return Body(self.solid.transform(np.asarray(target_from_source, dtype=float)[:3, :]))
+        moved_by = np.asarray(target_from_source, dtype=float)
+        return Body(self.solid.transform(moved_by[:3, :]), moved_by @ self.world_from_first)
 
     def shifted(self, by: np.ndarray) -> Body:
         """Return the body moved by (3,) [m]."""
-        return Body(self.solid.translate(np.asarray(by, dtype=float)))
+        by = np.asarray(by, dtype=float)
+        return Body(self.solid.translate(by), transform_from(np.eye(3), by) @ self.world_from_first)
+
+    def grown(self, share: float) -> Body:
+        """Return the body larger by a share, about the centre of its volume."""
+        center = self.moments[0]
+        return Body(self.solid.translate(-center).scale([1.0 + share] * 3).translate(center), self.world_from_first)
+
+    def within(self, world_from_box: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
+        """Return the volume [m^3] of what lies in the box from `low` to `high` (3,) [m] of a rigid frame (4, 4)."""
+        box = manifold3d.Manifold.cube(np.asarray(high - low, dtype=float)).translate(np.asarray(low, dtype=float))
+        return float((self.solid ^ box.transform(world_from_box[:3, :])).volume())
 
     def halves(self, plane: Plane) -> tuple[list[Body], list[Body]]:
         """Return the pieces on the side of the normal and on the other; a bent body may fall into more than two."""
         sides = self.solid.split_by_plane(plane.normal, -plane.d)
-        return pieces(sides[0]), pieces(sides[1])
+        return pieces(sides[0], self.world_from_first), pieces(sides[1], self.world_from_first)
 
     def section(self, plane: Plane) -> np.ndarray:
         """Return the points (N, 3) where edges cross the plane [m]; none where it misses."""
@@ -116,11 +134,11 @@ class Body:
         return self.vertices[crossing[:, 0]] * (1 - share) + self.vertices[crossing[:, 1]] * share
 
 
-def pieces(solid: manifold3d.Manifold) -> list[Body]:
-    """Return the connected pieces of a solid, largest first."""
+def pieces(solid: manifold3d.Manifold, world_from_first: np.ndarray | None = None) -> list[Body]:
+    """Return the connected pieces of a solid, largest first, but for what rounding leaves of faces in a plane."""
     if solid.is_empty():
         return []
-    bodies = [Body(part) for part in solid.decompose()]
+    bodies = [Body(part, world_from_first) for part in solid.decompose() if part.volume() > DUST]
     return sorted(bodies, key=lambda body: -body.volume)
 
 

@@ -19,6 +19,9 @@ MOST_FACES = 200_000
 """Most triangles of a mesh that is cut; by eye."""
 UNLIKE = 0.05
 """Share by which the volume that faces enclose may differ from the space inside: overlaps count twice."""
+GROWN = 0.001
+"""Share of a body that is nothing: parts that do not quite touch are grown by it, faces so near a hull lie on it. More
+than files round, less than a knife can do."""
 LATTICE = 64
 """Steps along each edge of the box around a mesh, at which it is asked what is inside."""
 SUFFIXES = (".ply", ".obj", ".stl", ".glb")
@@ -68,26 +71,87 @@ def _check_size(longest: float, path: Path, unit: str) -> None:
 def _close(mesh: trimesh.Trimesh, path: Path) -> tuple[Body, list[str]]:
     mended = []
     merged = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)  # files like STL repeat vertices: not a fault
-    merged.update_faces(merged.nondegenerate_faces() & merged.unique_faces())
-    if not merged.is_watertight:
-        merged.fill_holes()
-        if not merged.is_watertight:
-            edges = len(trimesh.grouping.group_rows(merged.edges_sorted, require_count=1))
-            raise BadInput(f"{path}: open: {edges} edges have one face", hint="close it in a mesh editor")
+    merged.update_faces(merged.nondegenerate_faces())
+    once = merged.copy()
+    once.update_faces(once.unique_faces())
+    if once.is_watertight:
+        parts = [once]
+    elif parts := closed_parts(merged):
+        mended.append(f"{len(parts)} closed parts that share faces or edges united")
+    elif _is_hull(once):
+        parts = [once.convex_hull]
+        mended.append("faces that lie over each other taken for the convex body that they enclose")
+    else:
+        filled = once.copy()
+        filled.fill_holes()
+        if not filled.is_watertight:
+            raise _open(once, path)
+        parts = [filled]
         mended.append("holes filled")
-    if not merged.is_winding_consistent or merged.volume < 0:
-        trimesh.repair.fix_normals(merged)
+    if any(not part.is_winding_consistent or part.volume < 0 for part in parts):
+        for part in parts:
+            trimesh.repair.fix_normals(part)
         mended.append("faces turned outwards")
-    components = merged.split(only_watertight=False)
+    components = [component for part in parts for component in part.split(only_watertight=False)]
     try:
-        if len(components) == 1:
-            return Body.of_mesh(merged.vertices, merged.faces), mended
-        united = unite([Body.of_mesh(part.vertices, part.faces) for part in components])
+        bodies = [Body.of_mesh(part.vertices, part.faces) for part in components]
     except ValueError as error:
         raise BadInput(f"{path}: no closed body: {error}", hint="repair it in a mesh editor") from None
+    if len(bodies) == 1:
+        return bodies[0], mended
+    united = unite(bodies)
     if len(united) > 1:
-        raise BadInput(f"{path}: {len(united)} bodies that do not hang together", hint="give them one by one")
-    return united[0], [*mended, f"{len(components)} bodies that pass through each other united"]
+        united = unite([body.grown(GROWN) for body in bodies])
+        mended.append(f"parts grown by {100 * GROWN:g} % to close the gaps between them")
+    if len(united) > 1:
+        raise BadInput(f"{path}: {len(unite(bodies))} bodies that do not hang together", hint="give them one by one")
+    if len(parts) == 1:
+        mended.append(f"{len(components)} bodies that pass through each other united")
+    return united[0], mended
+
+
+def closed_parts(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+    """Return the parts of a mesh that are closed by themselves, in the order of its faces, each as short a run of faces
+    as closes; none where the last one stays open. A part is closed where every edge has an even number of faces."""
+    parts: list[trimesh.Trimesh] = []
+    once: set[tuple[int, int]] = set()
+    first = 0
+    for number, (a, b, c) in enumerate(mesh.faces.tolist(), start=1):
+        for edge in ((a, b), (b, c), (c, a)):
+            once ^= {(min(edge), max(edge))}
+        if once:
+            continue
+        part = trimesh.Trimesh(mesh.vertices, mesh.faces[first:number], process=False)
+        part.remove_unreferenced_vertices()
+        if part.is_watertight and part.volume != 0.0:  # a face and its reverse close as well, around nothing
+            parts.append(part)
+        first = number
+    return parts if not once else []
+
+
+def _is_hull(mesh: trimesh.Trimesh) -> bool:
+    """Whether faces leave no edge open, and each of them lies on the convex hull."""
+    inside = GROWN * mesh.scale
+    if min(mesh.extents) < inside or (_edge_counts(mesh) == 1).any():
+        return False
+    heights = (mesh.vertices[None] - mesh.triangles_center[:, None]) * mesh.face_normals[:, None]
+    sides = heights.sum(axis=2)
+    return bool((np.minimum(sides.max(axis=1), -sides.min(axis=1)) < inside).all())
+
+
+def _edge_counts(mesh: trimesh.Trimesh) -> np.ndarray:
+    """Return how many faces each edge has (E,)."""
+    return np.asarray(np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1])
+
+
+def _open(mesh: trimesh.Trimesh, path: Path) -> BadInput:
+    counts = _edge_counts(mesh)
+    if (counts == 1).any():
+        return BadInput(f"{path}: open: {(counts == 1).sum()} edges have one face", hint="close it in a mesh editor")
+    return BadInput(
+        f"{path}: {(counts > 2).sum()} edges have three faces or more",
+        hint="take away faces that lie over each other or inside, in a mesh editor",
+    )
 
 
 def read_bodies_of(folder: Path, unit: Literal["m", "mm"]) -> tuple[list[Body], list[str]]:

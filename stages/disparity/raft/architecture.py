@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from scenewright.schemas.errors import BadInput
 
-OTHER_FILE = "give one of the authors' raftstereo-*.pth, or the .safetensors that scenewright made of it"
+OTHER_FILE = "give one of the authors' raftstereo-*.pth, or the .safetensors made of it"
 Shapes = Mapping[str, tuple[int, ...]]
 LARGEST_WIDTH = 2048
 """Channels of a layer at most: a damaged file must not ask for more memory than there is."""

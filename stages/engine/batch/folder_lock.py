@@ -20,7 +20,7 @@ def folder_lock(folder: Path, *, shared: bool = False, name: str = LOCK_NAME) ->
         folder.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(folder / name, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
-        raise MachineFailure(f"{folder}: {error.strerror}", hint="choose a writable --out") from None
+        raise MachineFailure(f"{folder}: {error.strerror}", hint="choose another --out") from None
     try:
         try:
             fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)

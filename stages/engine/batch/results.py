@@ -99,7 +99,7 @@ class ResultsFile:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             self.repaired = self._cut_torn_line()
         except OSError as error:
-            raise MachineFailure(f"{path}: {error.strerror}", hint="choose a writable --out") from None
+            raise MachineFailure(f"{path}: {error.strerror}", hint="choose another --out") from None
 
     def _cut_torn_line(self) -> int:
         """Return how many bytes of a torn line were cut off."""

@@ -22,7 +22,7 @@ def reason_to_run(job: Job, previous: SceneResult | None, retry: Retry) -> str |
     artifact looked at. A scene that somebody interrupted has not been run.
     """
     if retry == "all":
-        return "--retry all"
+        return "every scene is to run again"
     if previous is None:
         return "has not run"
     if previous.outcome == "interrupted":

@@ -148,7 +148,7 @@ def write_scripts(
             if name.endswith(".sh"):
                 (folder / name).chmod(0o755)
     except OSError as error:
-        raise MachineFailure(f"{folder}: {error.strerror}", hint="choose a writable --out") from None
+        raise MachineFailure(f"{folder}: {error.strerror}", hint="choose another --out") from None
     return Scripts(folder / "array.sh", folder / "collect.sh", folder / "submit.sh", tasks, len(jobs))
 
 

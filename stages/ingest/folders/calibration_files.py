@@ -1,8 +1,9 @@
-"""Calibrations in files beside images: which file counts, and the camera or stereo pair that it describes.
+"""The camera or stereo pair that a calibration file describes.
 
-Understood are ROS camera_calibration YAML, OpenCV's stereo YAML (M1 D1 M2 D2 R T), Kalibr and EuRoC YAML, KITTI
-`calib.txt` (P0: ...), Middlebury `calib.txt` (cam0=[...] doffs= baseline=), JSON with a matrix or fx fy cx cy, and text
-with 4 to 9 numbers, a 3x3 or 4x4 matrix, or lines `fx: 525`.
+Understood are ROS camera_calibration YAML, OpenCV's stereo YAML (M1 D1 M2 D2 R T), Kalibr and EuRoC YAML, ORB-SLAM's
+settings and camodocal's YAML (calibration_forms), KITTI `calib.txt` (P0: ...), Middlebury `calib.txt` (cam0=[...]
+doffs= baseline=), JSON with a matrix or fx fy cx cy, and text with 4 to 9 numbers, a 3x3 or 4x4 matrix, or lines `fx:
+525`.
 """
 
 from __future__ import annotations
@@ -18,23 +19,16 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML, YAMLError
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.calibration_forms import plain_camera, stated_depth_units
 from scenewright.stages.ingest.folders.files import read_json
 from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.kit.formats.trajectories import read_text
 from scenewright.stages.kit.geometry.transforms import inverse, is_rigid, transform_from
 
-NAMES = tuple(
-    f"{stem}.{ending}"
-    for stem in ("intrinsics", "intrinsic", "camera_info", "camera", "calibration", "calib", "camera_intrinsic")
-    for ending in ("yaml", "yml", "json", "txt")
-) + ("camera-intrinsics.txt", "K.txt", "sensor.yaml", "camchain.yaml")
-PAIR_NAMES = (("left.yaml", "right.yaml"), ("left.yml", "right.yml"), ("cam0/sensor.yaml", "cam1/sensor.yaml"))
-"""One file for each eye."""
+EXTRINSICS = ("extrinsics.yml", "extrinsics.yaml", "extrinsic.yml", "extrinsic.yaml")
+"""What OpenCV's stereo calibration writes beside intrinsics.yml: R and T."""
 LARGEST_FILE = 256_000
 """Bytes of a calibration file: its parser is slow, and it holds some dozens of numbers."""
-LARGEST_BASELINE = 1.0
-"""Largest distance of two eyes [m]. OpenCV's stereo files have the unit of whoever calibrated; eyes further apart than
-this are taken to be stated in millimetres, and a note says so."""
 OPENCV_TAG = re.compile(r"!!opencv-matrix\b")
 KITTI = re.compile(r"^P([0-3]):((?:\s+\S+){12})\s*$", re.MULTILINE)
 MIDDLEBURY_KEYS = ("cam0", "cam1", "doffs", "baseline")
@@ -54,24 +48,9 @@ class FolderCalibration:
     """(4, 4) from the left camera to the one whose poses the data set states (KITTI: camera 0)."""
     disparity_offset: float | None = None
     """Middlebury's doffs [pixel]: Z = fx * baseline / (disparity + doffs)."""
+    depth_units: float | None = None
+    """Stored depth per metre, where the file states it."""
     notes: tuple[str, ...] = ()
-
-
-def find_calibration(root: Path, camera_number: int = 0) -> FolderCalibration | None:
-    """Return the calibration in a folder, None without any. `camera_number` is the left camera of KITTI's files.
-
-    Raises BadInput when there is a file but no camera can be found in it.
-    """
-    for left, right in PAIR_NAMES:
-        if (root / left).is_file() and (root / right).is_file():
-            return _pair_of_files(root / left, root / right)
-    path = calibration_file(root)
-    return None if path is None else read_calibration(path, camera_number)
-
-
-def calibration_file(root: Path) -> Path | None:
-    """Return the first file in a folder that is named like a calibration."""
-    return next((root / name for name in NAMES if (root / name).is_file()), None)
 
 
 def read_calibration(path: Path, camera_number: int = 0) -> FolderCalibration:
@@ -100,7 +79,8 @@ def _read_yaml(path: Path) -> Any:
         raise BadInput(f"{path}: no YAML ({reason})"[:300]) from None
 
 
-def _pair_of_files(left: Path, right: Path) -> FolderCalibration:
+def pair_of_files(left: Path, right: Path) -> FolderCalibration:
+    """Read the calibrations of the two eyes. Raises BadInput."""
     first, second = read_calibration(left), read_calibration(right)
     documents = [_read_yaml(path) for path in (left, right)]
     left_from_right = None
@@ -123,19 +103,20 @@ def _from_document(document: Any, path: Path) -> FolderCalibration:
         raise BadInput(f"{path}: has no camera")
     if isinstance(document.get("cam0"), dict):
         return _kalibr(document, path)
+    units = stated_depth_units(document, str(path))
     for first, second in (("M1", "M2"), ("K1", "K2"), ("cameraMatrix1", "cameraMatrix2")):
         if first in document and second in document:
             return _opencv_pair(document, first, second, path)
     nested = document.get("camera")
-    return FolderCalibration(_camera_of(nested if isinstance(nested, dict) else document, path))
+    camera = nested if isinstance(nested, dict) else plain_camera(document, str(path))
+    return FolderCalibration(_camera_of(camera, path), depth_units=units)
 
 
 def _camera_of(document: dict[Any, Any], path: Path) -> CalibrationRecord:
     """Return the one camera of a document."""
-    matrix = _matrix(_first(document, "camera_matrix", "K", "k"), 3, 3)
-    if matrix is None:
-        columns = _matrix(_first(document, "intrinsic_matrix"), 3, 3)  # Open3D's is column major
-        matrix = None if columns is None else (columns.T if columns[2, 2] == 1 and columns[0, 2] == 0 else columns)
+    matrix = _matrix(_first(document, "camera_matrix", "K", "k", "intrinsic_matrix"), 3, 3)
+    if matrix is not None and matrix[2, 2] == 1 and not matrix[:2, 2].any():
+        matrix = matrix.T  # column by column, as Open3D and Apple write it
     listed = _numbers(_first(document, "intrinsics", "intrinsic"))
     if matrix is None and listed is not None and len(listed) == 4:
         matrix = _pinhole_matrix(listed)
@@ -181,15 +162,24 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
             raise BadInput(f"{path}: {name} is no 3x3 matrix")
         coefficients = _numbers(_first(document, f"D{number}", f"distCoeffs{number}")) or ()
         records.append(_record(matrix, size, path, coefficients, "plumb_bob"))
+    notes: tuple[str, ...] = ()
+    if "R" not in document or "T" not in document:
+        beside = next((path.parent / name for name in EXTRINSICS if (path.parent / name).is_file()), None)
+        if beside is None:
+            raise BadInput(
+                f"{path}: has no R and T, which say how the two cameras stand to each other",
+                hint=f"put OpenCV's {EXTRINSICS[0]} of the same calibration beside it",
+            )
+        found = _read_yaml(beside)
+        document = {**(found if isinstance(found, dict) else {}), **document}
+        path, notes = beside, (f"R and T read from {beside.name}",)
     rotation, offset = _matrix(document.get("R"), 3, 3), _numbers(document.get("T"))
     if rotation is None or offset is None or len(offset) != 3 or not is_rigid(transform_from(rotation, np.zeros(3))):
-        raise BadInput(f"{path}: R and T do not say how the two cameras stand to each other")
-    translation = np.array(offset)
-    notes: tuple[str, ...] = ()
-    if np.linalg.norm(translation) > LARGEST_BASELINE:
-        notes = (f"WARNING: baseline of {np.linalg.norm(translation):.4g} in {path.name} taken as millimetres",)
-        translation = translation / 1000
-    left_from_right = inverse(transform_from(rotation, translation))
+        raise BadInput(
+            f"{path}: R and T do not say how the two cameras stand to each other",
+            hint="R is a 3x3 rotation and T three numbers, x_right = R x_left + T",
+        )
+    left_from_right = inverse(transform_from(rotation, np.array(offset)))
     return FolderCalibration(records[0], records[1], left_from_right, notes=notes)
 
 
@@ -252,7 +242,7 @@ def _check_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
 def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     if KITTI.search(text):
         return _kitti(text, path, camera_number)
-    keyed = _split_lines(text)
+    keyed = split_lines(text)
     if "cam0" in keyed and "baseline" in keyed:
         return _middlebury(keyed, path)
     if "fx" in keyed:
@@ -269,7 +259,8 @@ def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     raise BadInput(f"{path}: {len(numbers)} numbers, expected fx fy cx cy [distortion], 3x3 or 4x4")
 
 
-def _split_lines(text: str) -> dict[str, str]:
+def split_lines(text: str) -> dict[str, str]:
+    """Return the values of lines `key: value` or `key = value`."""
     lines = (re.split(r"\s*[=:]\s*", line.strip(), maxsplit=1) for line in text.splitlines())
     return {words[0]: words[1] for words in lines if len(words) == 2}
 

@@ -14,15 +14,16 @@ from scenewright.schemas.outside import file_content, json_of
 from scenewright.schemas.places import resolved
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
-from scenewright.stages.ingest.images import decode_image, usable_color, usable_depth
+from scenewright.stages.ingest.images import DepthForm, decode_as_calibrated, decode_image, usable_color, usable_depth
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import LoadedFrame, Role, StreamInfo, Unusable
-from scenewright.stages.kit.formats.foxglove import decode_color
 from scenewright.stages.kit.formats.trajectories import read_text
 from scenewright.stages.kit.geometry.cameras import scaled
 
 COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm", ".pgm", ".bmp", ".tif", ".tiff", ".webp")
 DEPTH_SUFFIXES = (".png", ".pgm", ".tif", ".tiff")
+FARTHEST = 65.534
+"""Largest depth that a sequence holds [m]."""
 LARGEST_IMAGE_FILE = 1_000_000_000
 """Bytes of an image file that are read."""
 
@@ -84,13 +85,16 @@ def first_subfolder(root: Path, names: tuple[str, ...]) -> Path | None:
 
 
 def named_file(root: Path, name: Any, where: str) -> Path:
-    """Return the file that a log names, whether it exists or not.
+    """Return the file that a log names, whether it exists or not. Where no file is called so, a backslash separates
+    folders, as on Windows.
 
     Raises BadInput when the name is no name, or leads out of the folder `root`, by `..`, from the root of the file
     system, or over a link.
     """
     if not isinstance(name, str) or not name.strip() or "\0" in name or len(name) > 4096:
         raise BadInput(f"{where}: {name!r:.60} is no file name")
+    if "\\" in name and not (root / name).exists():
+        name = name.replace("\\", "/")
     path = root / name
     try:
         inside = not Path(name).is_absolute() and resolved(path).is_relative_to(root.resolve())
@@ -121,7 +125,7 @@ def file_bytes(path: Path, stream: str) -> bytes:
 
 
 def image_loader(
-    color: Path | None, depth: Path | None, camera: Camera, units_per_metre: float, *, has_color: bool = True
+    color: Path | None, depth: Path | None, camera: Camera, form: DepthForm, *, has_color: bool = True
 ) -> Callable[[], LoadedFrame]:
     """Return a function that reads and checks both images of a frame; `has_color`: whether the log has colour at all,
     without which a frame of it is unusable then."""
@@ -133,7 +137,7 @@ def image_loader(
             raise Unusable("missing_depth")
         return LoadedFrame(
             color=None if color is None else usable_color(file_bytes(color, "color"), camera),
-            depth=usable_depth(file_bytes(depth, "depth"), camera, units_per_metre),
+            depth=usable_depth(file_bytes(depth, "depth"), camera, form),
         )
 
     return load
@@ -167,11 +171,14 @@ def depth_image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
     return None
 
 
-def color_image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
-    """Return (width, height) of the first colour image that decodes, None when none does."""
+def color_image_size(paths: Iterable[Path], stated: tuple[int, int] = (0, 0)) -> tuple[int, int] | None:
+    """Return (width, height) of the first colour image that decodes, None when none does.
+
+    Where the calibration states a size, that of a picture which its EXIF orientation turns into that shape is turned.
+    """
     for path in paths:
         try:
-            image = decode_color(file_bytes(path, "color"))
+            image = decode_as_calibrated(file_bytes(path, "color"), stated)
         except Unusable:
             continue
         if image is not None:
@@ -185,7 +192,7 @@ def refuse_exr(names: Iterable[str], where: str) -> None:
     if exr is not None:
         raise BadInput(
             f"{where}: depth {exr} is OpenEXR, which is not read",
-            hint="convert it to 16-bit PNG in millimetres, or to .npy",
+            hint="convert it to 16-bit PNG in millimetres, or to .npy in metres",
         )
 
 
@@ -256,11 +263,33 @@ def camera_from_options(size: tuple[int, int] | None, parameters: IngestParamete
     return Camera(width=width, height=height, **{name: getattr(parameters, name) for name in names})
 
 
-def depth_units(parameters: IngestParameters, default: float) -> tuple[float, str]:
-    """Return depth units per metre and a note that says where the number comes from."""
+def depth_form(
+    parameters: IngestParameters, default: float, depths: Iterable[Path | None] = (), stated: float | None = None
+) -> tuple[DepthForm, str]:
+    """Return how depth is stored, and a note that says where the unit comes from.
+
+    `default` units per metre are those of the layout for whole numbers, `stated` those of the calibration file. The
+    `depths` of a layout that says nothing of floating point are looked at: such depth is in metres by habit, unless its
+    median is farther than a sequence can hold.
+    """
     if parameters.depth_scale is not None:
-        return parameters.depth_scale, f"depth unit given by option: 1/{parameters.depth_scale:g} m"
-    return default, f"depth unit assumed: 1/{default:g} m"
+        unit = f"depth unit given by option: 1/{parameters.depth_scale:g} m"
+        return DepthForm(parameters.depth_scale, parameters.depth_bits), unit
+    if stated is not None:
+        return DepthForm(stated, parameters.depth_bits), f"depth unit stated by the calibration: 1/{stated:g} m"
+    first = next((image for path in depths if path is not None and (image := _readable_depth(path)) is not None), None)
+    if first is not None and first.dtype.kind == "f":
+        valid = first[np.isfinite(first) & (first > 0)]
+        if len(valid) and float(np.median(valid)) < FARTHEST:
+            return DepthForm(1.0, parameters.depth_bits), "depth unit assumed: 1/1 m, as it is floating point"
+    return DepthForm(default, parameters.depth_bits), f"depth unit assumed: 1/{default:g} m"
+
+
+def _readable_depth(path: Path) -> np.ndarray | None:
+    try:
+        return raw_depth(path)
+    except Unusable:
+        return None
 
 
 def chosen_cameras(counts: dict[str, int], parameters: IngestParameters, where: str) -> tuple[str, ...]:

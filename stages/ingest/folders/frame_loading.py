@@ -10,17 +10,14 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import file_bytes, raw_depth
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, undistorted
-from scenewright.stages.ingest.images import depth_millimetres, fitted_color, usable_color
-from scenewright.stages.ingest.source import LoadedFrame, Unusable
-from scenewright.stages.kit.formats.foxglove import decode_color
-
-
-@dataclass(frozen=True)
-class FrameFiles:
-    """The files of one frame. None is a file that is missing."""
-
-    color: Path | None = None
-    depth: Path | None = None
+from scenewright.stages.ingest.images import (
+    DepthForm,
+    decode_as_calibrated,
+    depth_millimetres,
+    fitted_color,
+    usable_color,
+)
+from scenewright.stages.ingest.source import FrameFiles, LoadedFrame, Unusable
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,7 @@ class FrameFormat:
     has_color: bool
     """Whether the log has colour at all: then a frame without it is unusable."""
     has_depth: bool
-    units_per_metre: float = 1000.0
+    depth: DepthForm = DepthForm()
 
 
 def frame_loader(files: FrameFiles, form: FrameFormat) -> Callable[[], LoadedFrame]:
@@ -49,7 +46,7 @@ def frame_loader(files: FrameFiles, form: FrameFormat) -> Callable[[], LoadedFra
             raw = raw_depth(files.depth)
             if raw.shape == (form.camera.height, form.camera.width):
                 raw = undistorted(raw, form.recorded, form.camera, smooth=False)
-            depth = depth_millimetres(raw, form.camera, form.units_per_metre)
+            depth = depth_millimetres(raw, form.camera, form.depth)
         return LoadedFrame(color, depth)
 
     return load
@@ -63,7 +60,7 @@ def loaded_color(path: Path | None, recorded: RecordedCamera, camera: Camera, st
     data = file_bytes(path, stream)
     if recorded.lens.is_pinhole and recorded.camera == camera:
         return usable_color(data, camera)
-    image = decode_color(data)
+    image = decode_as_calibrated(data, (recorded.camera.width, recorded.camera.height))
     if image is None:
         raise Unusable(f"undecodable_{stream}", f"{path.name}: {len(data)} bytes")
     return undistorted(fitted_color(image, recorded.camera), recorded, camera, smooth=True)

@@ -9,6 +9,7 @@ Eight columns of numbers are named poses where half the first column or more nam
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -56,8 +57,9 @@ def _first_row(path: Path) -> list[str]:
     return next((row for row in rows if row), [])
 
 
-def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
-    """Return the pose of each image of `names` (stems, in order), or a stamped trajectory when the file is one.
+def read_pose_list(path: Path, names: list[str], files: Sequence[str] = ()) -> list[Pose] | StampedPoses:
+    """Return the pose of each image of `names` (in order), or a stamped trajectory when the file is one. `files` are
+    the stems of the images' files, where these are other names.
 
     Raises BadInput when the numbers of poses and images differ, and for rows that are none.
     """
@@ -69,7 +71,7 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
     columns = columns_of(path)
     if columns - 1 in WITHOUT_STAMP:
         rows = named_rows(path, columns)
-        images = _images([label for _, label, _ in rows], names)
+        images = _images([label for _, label, _ in rows], names, files)
         if columns != 8 or _are_names([label for _, label, _ in rows], images):
             return _poses_by_image(path, rows, images, names)
         return read_stamped_poses(path)
@@ -82,21 +84,22 @@ def read_pose_list(path: Path, names: list[str]) -> list[Pose] | StampedPoses:
     return _check_count([_pose(row, f"{path}: line {line}") for line, row in number_rows(path, columns)], names, path)
 
 
-def _images(labels: list[str], names: list[str]) -> list[str | None]:
+def _images(labels: list[str], names: list[str], files: Sequence[str]) -> list[str | None]:
     """Return the image of `names` (stems) that each label means, None where it means none.
 
     A label is a name with or without folder and ending; where no label is one, labels that are whole numbers mean the
     images whose names end in these numbers, if they differ.
     """
-    image_names, images = set(names), []
+    images: list[str | None] = []
+    image_of = dict(zip(files, names, strict=False)) | {name: name for name in names}
     for label in labels:
-        path = PurePosixPath(label)
+        path = PurePosixPath(label.replace("\\", "/"))
         stem = path.name if WHOLE_NUMBER.fullmatch(path.suffix[1:]) else path.stem  # decimals are no file's ending
-        images.append(next((text for text in (path.name, stem) if text in image_names), None))
+        images.append(next((image_of[text] for text in (path.name, stem) if text in image_of), None))
     if any(image is not None for image in images) or not all(WHOLE_NUMBER.fullmatch(label) for label in labels):
         return images
     by_number = {_last_number(name): name for name in names}
-    if None in by_number or len(by_number) < len(image_names):
+    if None in by_number or len(by_number) < len(set(names)):
         return images
     return [by_number.get(int(label)) for label in labels]
 

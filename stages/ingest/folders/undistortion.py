@@ -12,6 +12,8 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import resized_camera
+from scenewright.stages.ingest.lenses import FISHEYE_MODELS
+from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.kit.geometry.cameras import intrinsic_matrix
 
@@ -52,6 +54,14 @@ class RecordedCamera:
     def at(self, size: tuple[int, int] | None, where: str) -> RecordedCamera:
         """Return the camera for images of `size` (width, height). Raises BadInput for another shape."""
         return replace(self, camera=resized_camera(self.camera, size, where))
+
+
+def recorded_camera(record: CalibrationRecord, size: tuple[int, int] | None, where: str) -> RecordedCamera:
+    """Return the camera of a calibration for images of `size` (width, height). Raises BadInput for another shape."""
+    fx, _, cx, _, fy, cy, *_ = record.K
+    camera = Camera.of_outside(where, width=record.width, height=record.height, fx=fx, fy=fy, cx=cx, cy=cy)
+    lens = lens_of(record.D, where, fisheye=record.distortion_model in FISHEYE_MODELS)
+    return RecordedCamera(camera, lens).at(size, where)
 
 
 def lens_of(coefficients: list[float] | tuple[float, ...], where: str, *, fisheye: bool = False) -> Lens:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable
 
 import cv2
@@ -9,7 +10,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.association import fresh, partners
 from scenewright.stages.ingest.depth_registration import registered_depth
-from scenewright.stages.ingest.images import depth_millimetres, fitted_color
+from scenewright.stages.ingest.images import DepthForm, depth_millimetres, fitted_color
 from scenewright.stages.ingest.lenses import Lens
 from scenewright.stages.ingest.messages.camera_geometry import CameraGeometry
 from scenewright.stages.ingest.messages.cameras import CameraTopics
@@ -59,7 +60,7 @@ def frame_entries(
     without_pose: list[int] = []
     for index in range(len(stamps)):
         places: dict[str, Hashable] = {"color" if with_color else "depth": main.locations[index]}
-        stamp = int(stamps[index])
+        stamp = own_stamp = int(stamps[index])
         name = f"{stamp * 1e-9:.6f} s"
         for stream, topic in topic_of.items():
             if partner_of[stream][index] >= 0:
@@ -67,7 +68,7 @@ def frame_entries(
         missing = next((stream for stream in needed if stream not in places), None)
         if not first_of_stamp[index] or missing is not None:
             problem = NO_PARTNER.format(missing) if first_of_stamp[index] else "duplicate_stamp"
-            entries.append(Entry(name, stamp * 1e-9, None, _never, problem, topics.name))
+            entries.append(Entry(name, stamp * 1e-9, None, _never, problem, topics.name, stamp=own_stamp))
             continue
         if "depth" in topic_of:
             stamp = int(content.images[topic_of["depth"]].stamps[int(partner_of["depth"][index])])
@@ -77,16 +78,18 @@ def frame_entries(
         elif poses is not None:
             without_pose.append(stamp)
         load = _loader(log, places, geometry, parameters)
-        entries.append(Entry(name, stamp * 1e-9, pose, load, None, topics.name))
+        entries.append(Entry(name, stamp * 1e-9, pose, load, None, topics.name, stamp=own_stamp))
     notes = []
     if "depth" in topic_of:
         unused = len(content.images[topic_of["depth"]].stamps) - sum(entry.problem is None for entry in entries)
         if unused > 0:
             notes.append(f"{unused} depth images without a colour image of their own were left")
     if poses is not None and without_pose:
+        gap = math.ceil(max(poses.gap_at(geometry.frame, stamp) for stamp in without_pose) / 1e7) / 100
+        helps = f" (--maximum-transform-gap {gap:g} interpolates)" if gap * 1e9 > poses.gap else ""
         notes.append(
             f"{len(without_pose)} of {len(entries)} frames have no pose, the first at {without_pose[0] * 1e-9:.3f} s: "
-            f"{poses.why_not(geometry.frame, without_pose[0])} (--maximum-transform-gap {poses.gap * 1e-9:g})"
+            f"{poses.why_not(geometry.frame, without_pose[0])}{helps}"
         )
     return entries, notes
 
@@ -132,7 +135,7 @@ def _loader(
         if geometry.right is not None and "right" in places:
             right = picture(_fetch_image(log, places["right"], "right"), geometry.right, geometry.camera)
         if geometry.depth is not None and "depth" in places:
-            depth = _depth(_fetch_image(log, places["depth"], "depth"), geometry, parameters.depth_scale)
+            depth = _depth(_fetch_image(log, places["depth"], "depth"), geometry, parameters)
         if "labels" in places:
             labels = _labels(_fetch_image(log, places["labels"], "labels"), geometry)
         return LoadedFrame(color, depth, labels, right)
@@ -154,11 +157,12 @@ def picture(record: ImageRecord, lens: Lens, camera: Camera) -> np.ndarray | byt
     return fitted_color(lens.picture(pixels_or_picture), camera)
 
 
-def _depth(record: ImageRecord, geometry: CameraGeometry, scale: float | None) -> np.ndarray:
+def _depth(record: ImageRecord, geometry: CameraGeometry, parameters: IngestParameters) -> np.ndarray:
     assert geometry.depth is not None
     lens = geometry.depth
     recorded = lens.camera.model_copy(update={"width": lens.size[0], "height": lens.size[1]})
-    millimetres = depth_millimetres(depth_pixels(record), recorded, scale or depth_unit(record))
+    form = DepthForm(parameters.depth_scale or depth_unit(record), parameters.depth_bits)
+    millimetres = depth_millimetres(depth_pixels(record), recorded, form)
     millimetres = lens.pixels(millimetres, "depth")
     if geometry.target_from_depth is not None:
         millimetres = registered_depth(millimetres, lens.camera, geometry.camera, geometry.target_from_depth)

@@ -14,7 +14,7 @@ from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.ingest.messages.survey import LogContent
 from scenewright.stages.ingest.messages.topic_names import is_rectified, is_registered
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.stereo import stereo_lenses
+from scenewright.stages.ingest.stereo import UNCLEAR, in_metres, projected_baseline, stereo_lenses
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 SAME_PLACE = 1e-6
@@ -207,7 +207,7 @@ def _apart_geometry(
     note = f"WARNING: {_apart(topics, content)}: {why}"
     if fits:
         return CameraGeometry(depth.camera, frame, np.eye(4), color, depth, registered=False, notes=(*notes, note))
-    note += f"; colour ({width}x{height}) left out, as it is of another shape (--color-topic alone takes it alone)"
+    note += f"; colour ({width}x{height}) left out, as it is of another shape"
     return CameraGeometry(depth.camera, frame, np.eye(4), None, depth, notes=(*notes, note))
 
 
@@ -219,7 +219,7 @@ def _apart(topics: CameraTopics, content: LogContent) -> str:
 
 def _with_right(topics: CameraTopics, content: LogContent, parameters: IngestParameters, where: str) -> CameraGeometry:
     if topics.color is None or topics.right is None:
-        raise BadInput(f"{where}: no left images for {topics.right}", hint="give --color-topic")
+        raise BadInput(f"{where}: no left images for {topics.right}", hint="a pair needs the images of both")
     names = topics.color, topics.right
     calibrations = tuple(_needed_calibration(name, content, where) for name in names)
     sizes = tuple(content.images[name].size for name in names)
@@ -231,10 +231,15 @@ def _with_right(topics: CameraTopics, content: LogContent, parameters: IngestPar
         None if frames[0] == frames[1] else fixed_transform(frames[0], frames[1], content),
         names,
         where,
+        parameters.baseline,
     )
+    unit: tuple[str, ...] = ()
+    if parameters.baseline is None and projected_baseline(*calibrations) and abs(baseline) >= UNCLEAR[0]:
+        baseline, note = in_metres(baseline, where)  # transforms are in metres, projections of whoever calibrated
+        unit = (note,) if note else ()
     turn = np.eye(3) if left.camera_from_frame is None else left.camera_from_frame
     frame_from_camera = transform_from(turn.T, np.zeros(3))
-    notes = (*left.notes, *right.notes, f"stereo pair {names[0]} and {names[1]}, {baseline:.4g} m apart")
+    notes = (*left.notes, *right.notes, *unit, f"stereo pair {names[0]} and {names[1]}, {abs(baseline):.4g} m apart")
     geometry = CameraGeometry(
         left.camera, frames[0], frame_from_camera, left, None, right, baseline, notes=tuple(dict.fromkeys(notes))
     )

@@ -20,6 +20,7 @@ from scenewright.stages.ingest.messages.topic_names import (
     other_side,
     place,
     without_transport,
+    words,
 )
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.stereo import is_pair
@@ -272,8 +273,9 @@ def _camera_by_topic(
         role = "color" if stream == "right" else stream
         if topic is not None and (topic not in content.images or content.images[topic].role != role):
             has = sorted(name for name, images in content.images.items() if images.role == role)
+            why = content.topics[topic].unreadable if topic in content.topics else ""
             raise BadInput(
-                f"{where}: no {'colour' if role == 'color' else role} images on topic {topic!r}",
+                f"{where}: no {'colour' if role == 'color' else role} images on topic {topic!r}{why and f' ({why})'}",
                 hint=f"topics with such images: {', '.join(has) or 'none'}",
             )
     color, depth, right = topic_of["color"], topic_of["depth"], topic_of["right"]
@@ -316,6 +318,16 @@ def unpaired_side(camera: CameraTopics, content: LogContent) -> str | None:
                     "calibrations nor transforms between their frames give a baseline"
                 )
     return None
+
+
+def unread_depth(content: LogContent) -> str:
+    """Return which topics of images are called depth and are none, and why; empty without any."""
+    lines = [
+        f"{name}: {content.topics[name].unreadable}"
+        for name, images in sorted(content.images.items())
+        if images.role == "other" and "depth" in words(name) and content.topics[name].unreadable
+    ]
+    return "; ".join(lines)
 
 
 def alternatives(camera: CameraTopics, content: LogContent) -> list[str]:

@@ -19,14 +19,15 @@ from scenewright.stages.ingest.messages.cameras import (
     chosen_cameras,
     find_cameras,
     unpaired_side,
+    unread_depth,
 )
 from scenewright.stages.ingest.messages.container import MessageLog
 from scenewright.stages.ingest.messages.opening import open_message_log
-from scenewright.stages.ingest.messages.pose_source import PoseSource, find_poses
+from scenewright.stages.ingest.messages.pose_source import PoseSource, find_poses, why_no_poses
 from scenewright.stages.ingest.messages.survey import LogContent, survey
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
-from scenewright.stages.kit.formats.frames import LABELS_METADATA, WORLD_METADATA
+from scenewright.stages.kit.formats.frame_streams import LABELS_METADATA, WORLD_METADATA
 
 REFUSE_HINT = "leave out --damage refuse to use what is whole"
 
@@ -85,6 +86,7 @@ def _source(
         damage=damage,
         streams=content.streams(),
         other_cameras=tuple(camera.name for camera in others),
+        missing=main.missing,
         close=log.close,
     )
 
@@ -108,12 +110,18 @@ class _Built:
         unused = alternatives(topics, content)
         if unused:
             frame_notes.append(f"not used: {', '.join(unused)} (--color-topic, --depth-topic)")
-        self._notes = [*self._geometry.notes, *pose_notes, *depth_notes, *frame_notes]
+        self.missing = {} if self.poses else {"pose": why_no_poses(content, self._geometry.frame)}
+        if topics.depth is None and (unread := unread_depth(content)):
+            self.missing["depth"] = unread
+        reasons = [f"frames have no {'poses' if name == 'pose' else name}: {why}" for name, why in self.missing.items()]
+        self._notes = [*self._geometry.notes, *pose_notes, *depth_notes, *frame_notes, *reasons]
 
     def camera(self, registered: bool) -> SourceCamera:
         """Return the camera; `registered` is what the log says itself."""
         geometry = self._geometry
-        return SourceCamera(self.topics.name, geometry.camera, geometry.baseline, geometry.registered and registered)
+        eyes = (self.topics.color or "left", self.topics.right or "right")
+        registered = geometry.registered and registered
+        return SourceCamera(self.topics.name, geometry.camera, geometry.baseline, eyes=eyes, registered=registered)
 
     def notes(self, named: bool) -> list[str]:
         """Return what was assumed, with the camera's name in front when there are several."""

@@ -128,7 +128,10 @@ def _role_of_compressed(record: ImageRecord, subject: str, words: list[str]) -> 
     one_channel = png and data[25:26] in GREY_OR_PALETTE
     if png and encoding.startswith(("16uc1", "32fc1")) or one_channel and subject in DEPTH_WORDS:
         return "depth", ""
-    return _color_or_picture(subject, words)
+    role, reason = _color_or_picture(subject, words)
+    if role == "other" and data.startswith(JPEG_START):
+        reason = f"a JPEG, which keeps 8 bits a pixel: {reason} (record raw or compressedDepth images)"
+    return role, reason
 
 
 def _color_or_picture(subject: str, words: list[str]) -> tuple[Role, str]:

@@ -6,13 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.ingest.messages.survey import LogContent, Poses
+from scenewright.stages.ingest.messages.survey import STATIC, LogContent, Poses
 from scenewright.stages.ingest.messages.topic_names import words
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.transform_tree import TransformTree
 
 WORLD_FRAMES = ("map", "world", "odom")
 """Names of frames that stand still (REP-105)."""
+MOST_FRAMES = 12
+"""Most frames that a message lists."""
 NOT_MEASURED = frozenset({"goal", "goals", "target", "initialpose", "cmd", "command", "setpoint", "desired"})
 """Words of pose topics that say where something is wanted, not where it is."""
 
@@ -61,6 +63,14 @@ class PoseSource:
                 return reason
         return ""
 
+    def gap_at(self, frame: str, stamp: int) -> int:
+        """Return the largest gap [ns] that has to be interpolated over for the pose of a frame at a stamp [ns]."""
+        if self.poses is None:
+            return self.tree.gap_at(self.world, frame, stamp)
+        pairs = ((self.child, frame), (self.world, self.poses.frame_id))
+        gaps = [self.tree.gap_at(*pair, stamp) for pair in pairs if pair[0] != pair[1]]
+        return max([self.poses.track.gap_at(stamp), *gaps])
+
     def _between(self, target: str, source: str, stamp: int) -> np.ndarray | None:
         if target == source:
             return np.eye(4)
@@ -89,11 +99,21 @@ def find_poses(
             f"{where}: nothing leads from {parameters.world_frame!r} to the camera frame {frame!r}",
             hint="leave out --world-frame, or record tf and tf_static",
         )
-    if poses is None:
-        return None, [*notes, "frames have no poses"] if notes else [
-            f"no transforms lead to the camera frame {frame!r}: frames have no poses"
-        ]
-    return poses, [*notes, *poses.notes]
+    return poses, notes if poses is None else [*notes, *poses.notes]
+
+
+def why_no_poses(content: LogContent, frame: str) -> str:
+    """Return in words what the log has instead of poses of a camera's frame."""
+    frames = [repr(name) for name in content.tree.frames]
+    known = ", ".join(frames[:MOST_FRAMES]) + (f", ... ({len(frames)} frames)" if len(frames) > MOST_FRAMES else "")
+    leading = f"no transforms lead to the camera frame {frame!r}"
+    parts = [leading if not content.tree.has_parent(frame) else f"transforms of {frame!r} do not say where it is"]
+    parts.append(f"frames that the log knows: {known}" if frames else "the log holds no transforms")
+    moving = any(topic.rpartition("/")[2] == "tf" for topic in content.transform_topics)
+    moving = moving or any(poses.child_frame_id for poses in content.poses.values())
+    if moving and not any(name.endswith(STATIC) for name in content.topics):
+        parts.append(f"/{STATIC} is not among its topics, which says where the camera is mounted (record it too)")
+    return "; ".join(parts)
 
 
 def _from_tree(

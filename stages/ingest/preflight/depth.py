@@ -8,19 +8,18 @@ from collections.abc import Iterable
 import numpy as np
 from scenewright.stages.ingest.preflight.looking import Look
 from scenewright.stages.ingest.preflight.report import DepthReport, Finding, exact
+from scenewright.stages.ingest.preflight.units import plausible_units
 
 PLAUSIBLE = (0.15, 15.0)
 """Median depth [m] of what depth cameras record."""
-TYPICAL = (0.4, 6.0)
-"""Median depth [m] of rooms and tables; used to choose between explanations, never to refuse."""
-FACTORS = (0.001, 0.1, 0.2, 1 / 6.5535, 5.0, 6.5535, 10.0, 1000.0)
-"""What wrong units do to depth: metres, millimetres, 0.1 mm and the divisors 5000 and 6553.5, one for another."""
 LITTLE_VALID = 0.1
 """Share of valid pixels below which depth is called scarce; by eye."""
 SATURATED = 0.2
 """Share of valid pixels at the largest value that suggests a cut-off."""
 COARSE_VALUES = 256
 """Depth with fewer values in every frame was 8-bit once."""
+MULTIPLE = 5
+"""What TUM's 1/5000 m makes of millimetres, which keep it in every value."""
 HISTOGRAM_BINS = 48
 """Bars of the depth histogram; by eye."""
 
@@ -67,32 +66,20 @@ def _weighted_quantile(values: np.ndarray, counts: np.ndarray, quantile: float) 
     return float(values[np.searchsorted(total, quantile * total[-1])])
 
 
-def plausible_factors(median: float) -> list[float]:
-    """Return the unit factors that would make a median depth [m] typical of a room, the mildest first."""
-    fitting = [factor for factor in FACTORS if TYPICAL[0] <= median * factor <= TYPICAL[1]]
-    return sorted(fitting, key=lambda factor: abs(np.log(factor)))
-
-
-def factor_words(factor: float) -> str:
-    """Return `5 times too large` and the like for what depth must be multiplied by."""
-    return f"{1 / factor:.4g} times too large" if factor < 1 else f"{factor:.4g} times too small"
-
-
 def units_per_metre(notes: Iterable[str], depth_scale: float | None) -> float:
     """Return the depth units per metre that a log was read with: the option's, else what the reader noted, else 1000
     (millimetres, which every other reader takes)."""
     if depth_scale is not None:
         return depth_scale
-    noted = [match for note in notes if (match := re.match(r"depth unit assumed: 1/([0-9.e+]+) m", note))]
+    noted = [
+        match
+        for note in notes
+        if (match := re.match(r"depth unit (?:assumed|stated by the calibration): 1/([0-9.e+]+) m", note))
+    ]
     return float(noted[0][1]) if noted else 1000.0
 
 
-def scale_advice(factor: float, units: float) -> str:
-    """Return the option of ingest that multiplies depth by a factor, read with so many units per metre so far."""
-    return f"ingest with --depth-scale {units / factor:.6g}"
-
-
-def depth_findings(report: DepthReport, units: float, camera: str) -> list[Finding]:
+def depth_findings(report: DepthReport, units: float, camera: str, *, has_poses: bool = True) -> list[Finding]:
     """Return what is odd about the depth itself; `units` per metre is how it was read.
 
     Whether it agrees with the poses is said with the poses.
@@ -103,14 +90,20 @@ def depth_findings(report: DepthReport, units: float, camera: str) -> list[Findi
         findings.append(Finding(severity=severity, check="depth", message=message, fix=fix, camera=camera))  # type: ignore[arg-type]
 
     if not report.plausible and report.factor_by != "poses":
-        factors = plausible_factors(report.median)
-        words = " or ".join(factor_words(factor) for factor in factors[:3]) or "no usual unit explains it"
+        likely = plausible_units(report.median, units)
+        words = [f"--depth-scale {unit:g} ({report.median * units / unit:.3g} m away)" for unit in likely[:4]]
+        no_unit = "" if likely else ", and no usual unit explains it"
         add(
             "wasted",
-            f"depth unit: the median depth is {report.median:.3g} m ({words})",
-            scale_advice(factors[0], units)
-            if factors
-            else "find out the unit of the depth images and give --depth-scale",
+            f"depth unit: the median depth is {report.median:.3g} m{no_unit}",
+            f"ingest with {', or '.join(words)}" if words else "find out the unit of the depth images: --depth-scale",
+        )
+    elif not has_poses and units == 1000 and report.step == MULTIPLE / 1000 and report.distinct_values >= COARSE_VALUES:
+        add(
+            "doubtful",
+            f"every value of the depth is a multiple of {MULTIPLE}, as of millimetres that were stored in 1/5000 m; "
+            f"the median is {report.median:.3g} m, or {report.median / MULTIPLE:.3g} m",
+            f"ingest with --depth-scale {MULTIPLE * 1000}, where that is so",
         )
     if report.valid_share < LITTLE_VALID:
         add("doubtful", f"only {100 * report.valid_share:.1f} % of the depth pixels are valid")

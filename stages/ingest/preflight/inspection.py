@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,8 +13,11 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.manifest import MANIFEST_NAME
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.detection import log_format, open_log
+from scenewright.stages.ingest.foreign import refuse_foreign_folder, refuse_lone_recording
+from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
+from scenewright.stages.ingest.preflight.bits import bits_finding
 from scenewright.stages.ingest.preflight.calibration import calibration_findings, calibration_report
 from scenewright.stages.ingest.preflight.choice import Choice, choose
 from scenewright.stages.ingest.preflight.depth import depth_findings, depth_report, units_per_metre
@@ -21,8 +25,15 @@ from scenewright.stages.ingest.preflight.epipolar import FeaturePairs
 from scenewright.stages.ingest.preflight.looking import Look, look_at_entry
 from scenewright.stages.ingest.preflight.motion import motion_findings, motion_report
 from scenewright.stages.ingest.preflight.pictures import picture_findings, picture_report
-from scenewright.stages.ingest.preflight.pose_findings import depth_is_blamed, pose_findings, rigidity_words
-from scenewright.stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES, LEAST_PAIRS, PoseOutcome, check_poses
+from scenewright.stages.ingest.preflight.pose_findings import pose_findings, rigidity_words
+from scenewright.stages.ingest.preflight.poses import (
+    BY_DEPTH,
+    BY_FEATURES,
+    LEAST_PAIRS,
+    Candidate,
+    PoseOutcome,
+    check_poses,
+)
 from scenewright.stages.ingest.preflight.registration import check_registration, registration_findings
 from scenewright.stages.ingest.preflight.report import (
     CameraReport,
@@ -42,6 +53,7 @@ from scenewright.stages.ingest.preflight.settings import ingest_parameters
 from scenewright.stages.ingest.preflight.steps import step_reports
 from scenewright.stages.ingest.preflight.stereo import stereo_findings, stereo_report, with_stereo_depth
 from scenewright.stages.ingest.preflight.streams import all_streams, clock_lines, stream_findings, stream_reports
+from scenewright.stages.ingest.preflight.units import Reading, readings, room_extent
 from scenewright.stages.ingest.preflight.upright import gravity_findings, gravity_report
 from scenewright.stages.ingest.registry import all_layouts
 from scenewright.stages.ingest.selection import NOT_SELECTED, select
@@ -54,16 +66,8 @@ LEAST_FRAMES = 12
 HEAVY_LOSS, LOSS = 0.5, 0.1
 """Shares of the frames that are lost from which a log is wasted, and doubtful."""
 NO_POSES = PoseReport(verdict="none", method="none", detail="the frames have no poses")
-ADVICE = {
-    "no_depth_within_tolerance": "compare the clocks of colour and depth; ingest has --maximum-time-difference",
-    "missing_pose": "ingest has --maximum-transform-gap, --pose-topic and --world-frame",
-    "size_mismatch": "colour and depth of a frame must have one shape",
-    "depth_not_16_bit": "pictures of depth for people are no depth: record 16-bit or float images",
-    "no_valid_depth": "is the depth unit right (--depth-scale)?",
-    "missing_color": "colour and depth files must pair",
-    "missing_depth": "colour and depth files must pair",
-}
-"""Reason for which frames are lost -> what to do."""
+TAKEN = re.compile(r"WARNING: (.* taken .*) \((--.*)\)")
+"""A warning of a reader that takes one thing for another, and the option that decides."""
 SEVERITIES = ("wasted", "doubtful", "note")
 
 
@@ -107,6 +111,8 @@ def _refuse_what_is_nothing(path: Path, parameters: IngestParameters) -> None:
     if not (path.is_dir() and parameters.format == "auto"):
         return
     if not any(log_format(layout).matches(path) for layout in all_layouts()):
+        refuse_foreign_folder(path)
+        refuse_lone_recording(path)
         raise BadInput(
             f"{path}: not an artifact (no {MANIFEST_NAME}), and no log in a format that is known",
             hint="docs/LOGS.md describes the layouts",
@@ -159,8 +165,12 @@ def inspect_source(
             judged, outcome, camera_findings = _judge_camera(
                 source_camera, by_camera[source_camera.name], material, source, parameters
             )
+            misread = bits_finding(path, parameters, source_camera, material.looks)
         materials.append(replace(material, outcome=outcome))
         reports.append(judged)
+        if misread is not None:  # what else depth seems to be wrong by follows from it
+            blamed = ("depth", "poses", "registration")
+            camera_findings = [misread, *(finding for finding in camera_findings if finding.check not in blamed)]
         findings += camera_findings
     frames = _frames_report(source, selected, drops, materials, unusable)
     streams = stream_reports(source)
@@ -168,9 +178,10 @@ def inspect_source(
     has_poses = any(report.poses.verdict != "none" for report in reports)
     findings = [
         *_frame_findings(frames, source),
+        *warning_findings(source),
         *_content_findings(reports, source),
         *findings,
-        *stream_findings(streams),
+        *stream_findings(streams, source.notes),
         *gravity_findings(gravity, has_poses),
     ]
     if len(source.cameras) == 1:
@@ -239,30 +250,32 @@ def _judge_camera(
     stereo = stereo_report(looks, source_camera.baseline)
     outcome = _pose_outcome(source_camera, material, depth is not None)
     calibration = calibration_report(source_camera.camera)
-    best = outcome.report.best
+    best, ways = outcome.report.best, []
     if best is not None and outcome.report.decisive:
         if best.focal_factor != 1:
             calibration = calibration.model_copy(update={"focal_fit": significant(best.focal_factor, 3)})
         only_scale = best.convention == "as-is" and best.translation_scale != 1
-        if depth is not None and only_scale and depth_is_blamed(best.translation_scale, depth.median):
-            depth = depth.model_copy(update={"factor": exact(1 / best.translation_scale), "factor_by": "poses"})
+        if depth is not None and outcome.best is not None and best.translation_scale != 1:
+            ways = _readings(outcome.best, material, units, depth.median)
+            if only_scale and "depth_scale" in ways[0].changes:
+                depth = depth.model_copy(update={"factor": exact(units / ways[0].depth_scale), "factor_by": "poses"})
     registration = check_registration(looks, choice.runs, source_camera.registered)
     pictures = picture_report(looks, choice.runs)
     motion = motion_report(poses, material.times, looks, choice.runs) if poses is not None else None
     findings += calibration_findings(calibration, source_camera.camera, name)
     if depth is not None:
-        findings += depth_findings(depth, units, name)
+        findings += depth_findings(depth, units, name, has_poses=poses is not None)
     if stereo is not None:
         findings += stereo_findings(stereo, name)
     if poses is not None:
         findings += pose_findings(
             outcome.report,
-            depth,
+            ways,
             source_camera.camera,
             interval,
             name,
-            untouched=_are_poses_untouched(parameters),
-            units=units,
+            convention=parameters.pose_convention,
+            pose_scale=parameters.pose_scale,
         )
     if motion is not None:
         findings += motion_findings(motion, outcome.report.verdict == "agree", name)
@@ -314,9 +327,12 @@ def _pose_outcome(source_camera: SourceCamera, material: CameraMaterial, has_dep
     return replace(outcome, report=outcome.report.model_copy(update=changes))
 
 
-def _are_poses_untouched(parameters: IngestParameters) -> bool:
-    """Whether poses are taken as the log has them."""
-    return parameters.pose_convention == "as-is" and parameters.pose_scale == 1
+def _readings(best: Candidate, material: CameraMaterial, units: float, median_depth: float) -> list[Reading]:
+    """Return how depth, read with `units` a metre, and translations may agree as a hypothesis says."""
+    assert material.poses is not None
+    poses = best.poses(material.poses)
+    room = room_extent([(look, poses[index]) for index, look in material.looks.items()])
+    return readings(best.scale, units, median_depth, room)
 
 
 def _gravity(
@@ -399,6 +415,12 @@ def _frame_findings(frames: FramesReport, source: LogSource) -> list[Finding]:
     return findings
 
 
+def warning_findings(source: LogSource) -> list[Finding]:
+    """Return the reader's warnings about times and depth: what it took in the place of what the log seems to say."""
+    found = (TAKEN.fullmatch(note) for note in source.notes)
+    return [Finding(severity="doubtful", check="reading", message=match[1], fix=match[2]) for match in found if match]
+
+
 def _matrices(source: LogSource) -> np.ndarray:
     poses = [entry.world_from_camera for entry in source.entries if entry.world_from_camera is not None]
     return np.array([matrix for matrix in poses if matrix.shape == (4, 4)]).reshape(-1, 4, 4)
@@ -416,16 +438,19 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
     def add(severity: Severity, check: str, message: str, fix: str = "") -> None:
         findings.append(Finding(severity=severity, check=check, message=message, fix=fix))
 
+    def why(stream: str) -> str:
+        return f" ({source.missing[stream]})" if stream in source.missing else ""
+
     if "depth" not in streams and not stereo:
         advice = "record depth; colour alone can only be looked at"
-        add("wasted", "depth", "there is no depth and no stereo pair with a baseline", advice)
+        add("wasted", "depth", f"there is no depth and no stereo pair with a baseline{why('depth')}", advice)
     elif "depth" not in streams:
         add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")
     if "color" not in streams:
         add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes")
     if "pose" not in streams:
-        advice = "run reconstruct-without-poses, which estimates them, or give fuse a --trajectory"
-        add("doubtful", "poses", "the frames have no poses: fuse needs them", advice)
+        advice = "run reconstruct-without-poses, which estimates them, or give ingest or fuse your own --trajectory"
+        add("doubtful", "poses", f"the frames have no poses, which fuse needs{why('pose')}", advice)
     return findings
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
-from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
-from scenewright.stages.ingest.preflight.depth import TYPICAL, factor_words, scale_advice
+from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS, PoseConvention
 from scenewright.stages.ingest.preflight.poses import BY_DEPTH, BY_FEATURES
-from scenewright.stages.ingest.preflight.report import DepthReport, Finding, Hypothesis, PoseReport, Severity
+from scenewright.stages.ingest.preflight.report import Finding, Hypothesis, PoseReport, Severity
+from scenewright.stages.ingest.preflight.units import Reading
 
-DEPTH_DIVISORS = (0.2, 5.0, 6.5535, 1 / 6.5535)
-"""Ratios that come from depth images (5000 and 6553.5 against 1000), never from poses."""
 FLIPS: dict[str, str] = {
     "inverse": "invert the poses",
     "opengl": "turn the camera axes from OpenGL's: multiply each pose by diag(1, -1, -1, 1) from the right",
@@ -26,34 +24,21 @@ FLIPS: dict[str, str] = {
 }
 
 
-def depth_is_blamed(scale: float, median_depth: float) -> bool | None:
-    """Whether depth, rather than the translations, is wrong by `scale`; None when it may be either.
-
-    `scale` is what translations must be multiplied by, or depth divided by, for the two to agree. A unit that only
-    depth images have decides; otherwise the one whose present unit gives an untypical room.
-    """
-    if any(abs(np.log(scale / divisor)) < 0.1 for divisor in DEPTH_DIVISORS):
-        return True
-    typical = TYPICAL[0] <= median_depth <= TYPICAL[1]
-    if typical:
-        return False
-    return True if TYPICAL[0] <= median_depth / scale <= TYPICAL[1] else None
-
-
 def pose_findings(
     report: PoseReport,
-    depth: DepthReport | None,
+    ways: Sequence[Reading],
     camera: Camera,
     interval: float,
     name: str,
     *,
-    untouched: bool,
-    units: float,
+    convention: PoseConvention,
+    pose_scale: float,
 ) -> list[Finding]:
     """Return what the pose check found.
 
-    `interval` [s] is that of the frames; `untouched` says that no option changes the poses already; `units` per metre
-    is how depth was read.
+    `ways` are the readings of depth and translations under which they agree where the best hypothesis scales them,
+    likeliest first; `interval` [s] is that of the frames; `convention` and `pose_scale` are what the options
+    make of the poses already.
     """
     findings: list[Finding] = []
     measure = BY_FEATURES if report.method == "epipolar" else BY_DEPTH
@@ -97,11 +82,19 @@ def pose_findings(
                 "calibration",
             )
         elif best.convention == "as-is":
-            _add_scale(add, severity, best, depth, contradict, agree, untouched, units)
+            depth_first = bool(ways) and "depth_scale" in ways[0].changes
+            scale = best.translation_scale
+            either = f"with translations times {scale:.4g}, or depth times {1 / scale:.4g}, {agree}"
+            add(
+                "wasted" if depth_first else severity,
+                f"{'depth unit: ' if depth_first else ''}{contradict}; {either}",
+                f"ingest with {_options(best, ways, pose_scale)}",
+                "depth" if depth_first else "poses",
+            )
         else:
             words = CONVENTION_WORDS[best.convention]  # type: ignore[index]
             scaled = f" and translations times {best.translation_scale:.4g}" if best.translation_scale != 1 else ""
-            add(severity, f"{contradict}; with {words}{scaled} {agree}", _flip_fix(best, untouched))
+            add(severity, f"{contradict}; with {words}{scaled} {agree}", _flip_fix(best, ways, convention, pose_scale))
     elif report.turns_only:
         add(
             "wasted" if report.verdict == "contradict" else "doubtful",
@@ -122,37 +115,6 @@ def pose_findings(
     return findings
 
 
-def _add_scale(
-    add: Callable[..., None],
-    severity: Severity,
-    best: Hypothesis,
-    depth: DepthReport | None,
-    contradict: str,
-    agree: str,
-    untouched: bool,
-    units: float,
-) -> None:
-    scale = best.translation_scale
-    blamed = depth_is_blamed(scale, depth.median) if depth is not None else False
-    times = f"translations times {scale:.4g}"
-    if blamed:
-        add(
-            "wasted",
-            f"depth unit: depth is {factor_words(1 / scale)} for the poses: {contradict}; with depth times "
-            f"{1 / scale:.4g} {agree}",
-            scale_advice(1 / scale, units),
-            "depth",
-        )
-    elif blamed is None:
-        add(
-            severity,
-            f"{contradict}; with {times}, or depth times {1 / scale:.4g}, {agree}",
-            f"{_scale_fix(scale, untouched)}, or {scale_advice(1 / scale, units)}",
-        )
-    else:
-        add(severity, f"{contradict}; with {times} {agree}", _scale_fix(scale, untouched))
-
-
 def _short(hypothesis: Hypothesis | None) -> str:
     if hypothesis is None:
         return ""
@@ -166,16 +128,18 @@ def _short(hypothesis: Hypothesis | None) -> str:
     return " with ".join(phrases) or "as they are"
 
 
-def _flip_fix(best: Hypothesis, untouched: bool) -> str:
-    if untouched:
-        scale = "" if best.translation_scale == 1 else f" --pose-scale {best.translation_scale:.4g}"
+def _flip_fix(best: Hypothesis, ways: Sequence[Reading], convention: PoseConvention, pose_scale: float) -> str:
+    scale = f" {_options(best, ways, pose_scale)}" if best.translation_scale != 1 else ""
+    if convention == "as-is":
         return f"ingest with --pose-convention {best.convention}{scale}"
-    scale = "" if best.translation_scale == 1 else f" and {_scale_fix(best.translation_scale, untouched)}"
-    return f"{FLIPS[best.convention]}{scale}, after what the options do already"
+    return f"{FLIPS[best.convention]}{', with' if scale else ''}{scale}, after what --pose-convention does already"
 
 
-def _scale_fix(scale: float, untouched: bool) -> str:
-    return f"ingest with --pose-scale {scale:.4g}" if untouched else f"multiply the translations by {scale:.4g}"
+def _options(best: Hypothesis, ways: Sequence[Reading], pose_scale: float) -> str:
+    """Return the options that make depth and translations agree, the likeliest way first."""
+    if not ways:  # without depth there is no other witness of the size
+        return f"--pose-scale {pose_scale * best.translation_scale:.4g}"
+    return ", or ".join(way.words(pose_scale) for way in ways[:3])
 
 
 def _witness_fix(report: PoseReport) -> str:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from scenewright.stages.ingest.clocks import FASTEST, NO_RATE
 from scenewright.stages.ingest.preflight.report import Finding, Gaps, StreamReport, exact, significant
 from scenewright.stages.ingest.source import Entry, LogSource, StreamInfo
+from scenewright.stages.kit.formats.stamps import USUAL_STEP
 
 GAP_FACTOR = 3.0
 """Intervals over so many medians are gaps."""
@@ -121,13 +123,25 @@ def _offset_line(color: np.ndarray, depth: np.ndarray) -> str:
     return line
 
 
-def stream_findings(streams: Iterable[StreamReport]) -> list[Finding]:
-    """Return what is odd about the streams."""
+def stream_findings(streams: Iterable[StreamReport], notes: Iterable[str] = ()) -> list[Finding]:
+    """Return what is odd about the streams; a rate that a note of the reader speaks of is not spoken of again."""
     findings = []
+    told = any(NO_RATE in note for note in notes)
     for stream in streams:
         if stream.role in ("calibration", "transforms", "other", "unreadable"):
             continue
-        if stream.gaps.count and (
+        is_of_images, rate = stream.role in ("color", "depth", "right"), stream.rate or 0.0
+        if is_of_images and stream.count > 2 and 0 < rate < 1 / USUAL_STEP:
+            message = (
+                f"{stream.name}: pictures are {1 / rate:.3g} s apart: are the stamps of another unit than seconds?"
+            )
+            advice = "write them in seconds, where they are"
+            findings.append(Finding(severity="doubtful", check="streams", message=message, fix=advice))
+        if is_of_images and rate > FASTEST:
+            if not told:
+                message = f"{stream.name}: stamps make {rate:,.0f} pictures a second, {NO_RATE}"
+                findings.append(Finding(severity="doubtful", check="streams", message=message))
+        elif stream.gaps.count and (
             stream.gaps.longest > LONG_GAP or stream.gaps.count > MANY_GAPS * max(stream.count - 1, 1) + 1
         ):
             findings.append(

@@ -9,10 +9,10 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.preflight.looking import Look
-from scenewright.stages.ingest.preflight.report import Finding, GravityReport, significant
+from scenewright.stages.ingest.preflight.report import Finding, GravityReport, Severity, significant
 from scenewright.stages.ingest.source import LogSource
 from scenewright.stages.kit.geometry.surface_samples import surface_samples
-from scenewright.stages.kit.geometry.upright_world import make_upright
+from scenewright.stages.kit.geometry.upright_world import REASON, make_upright
 
 
 def gravity_report(
@@ -52,4 +52,8 @@ def gravity_findings(report: GravityReport, has_poses: bool) -> list[Finding]:
     if has_poses and report.method in ("none", "mean_camera_up"):
         message = f"up is not sure: {report.detail}"
         return [Finding(severity="note", check="gravity", message=message, fix="--gravity given --up AXIS if known")]
+    if reason := REASON.search(report.detail):
+        severity: Severity = "doubtful" if reason[1] == "doubtful" else "note"
+        message = f"up may be wrong: {reason[2]}"
+        return [Finding(severity=severity, check="gravity", message=message, fix="--gravity given --up AXIS if known")]
     return []

@@ -19,7 +19,7 @@ from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import build_file_descriptor_set
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.formats import foxglove
-from scenewright.stages.kit.formats.frames import CAMERA_NAME
+from scenewright.stages.kit.formats.frame_streams import CAMERA_NAME
 from scenewright.stages.kit.formats.indexed_mcap import IndexedMcap, Location
 from scenewright.stages.kit.stereo.disparity_map import DisparityMap
 

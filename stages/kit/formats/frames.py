@@ -2,25 +2,23 @@
 
 Topics of a camera called `camera`: `/camera/color` CompressedImage (JPEG or PNG), `/camera/depth` RawImage 16UC1 [mm],
 `/camera/labels` RawImage mono16, `/camera/calibration` CameraCalibration, and of a rectified stereo pair
-`/camera/right` CompressedImage with `/camera/right_calibration`, whose P holds the baseline; other cameras have topics
-under their own name. `/tf` FrameTransforms world -> camera. All messages of a frame carry the frame's time as log time
-and header stamp, which no other frame has. Metadata record `scenewright`: what is known of the world frame; metadata
-record `labels`: instance -> class name.
+`/camera/right` CompressedImage with `/camera/right_calibration`, whose P holds the baseline. Beside them may stand
+`/camera/confidence` RawImage mono8 (0 low, 1 medium, 2 high) and `/camera/picture` CompressedImage, the colour at its
+full size, with `/camera/picture_calibration`. Other cameras have topics under their own name. `/tf` FrameTransforms
+world -> camera. All messages of a frame carry the frame's time as log time and header stamp, which no other frame has.
+Metadata record `scenewright`: what is known of the world frame; metadata record `labels`: instance -> class name.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
@@ -29,24 +27,23 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import LabelEntry, Sequence
 from scenewright.stages.kit.formats import foxglove
+from scenewright.stages.kit.formats.exif import without_orientation
+from scenewright.stages.kit.formats.frame_streams import (
+    CAMERA_FRAME,
+    CAMERA_NAME,
+    LABELS_METADATA,
+    MESSAGE_TYPES,
+    MOST_CONFIDENT,
+    PIXEL_STREAMS,
+    TOPIC,
+    TRANSFORMS,
+    WORLD_FRAME,
+    WORLD_METADATA,
+    camera_of,
+    label_table,
+)
 from scenewright.stages.kit.formats.indexed_mcap import IndexedMcap, Location
 from scenewright.stages.kit.geometry.transforms import is_rigid
-
-TRANSFORMS = "/tf"
-WORLD_FRAME, CAMERA_FRAME = "world", "camera"
-WORLD_METADATA, LABELS_METADATA = "scenewright", "labels"
-MESSAGE_TYPES: dict[str, Any] = {
-    "color": CompressedImage,
-    "right": CompressedImage,
-    "depth": RawImage,
-    "labels": RawImage,
-    "calibration": CameraCalibration,
-    "right_calibration": CameraCalibration,
-}
-"""Last part of the topic -> message type; the first part is the camera."""
-CAMERA_NAME = re.compile(r"[A-Za-z0-9_]+")
-_TOPIC = re.compile(rf"/({CAMERA_NAME.pattern})/({'|'.join(MESSAGE_TYPES)})")
-PIXEL_STREAMS = ("color", "depth", "labels", "right")
 
 
 @dataclass(frozen=True)
@@ -66,15 +63,20 @@ class Frame:
     camera_name: str = CAMERA_FRAME
     right: np.ndarray | None = None
     """(H, W, 3) uint8 RGB: right eye of a rectified stereo pair."""
+    confidence: np.ndarray | None = None
+    """(H, W) uint8 0..2: how far depth is to be believed."""
+    picture: np.ndarray | None = None
+    """(H', W', 3) uint8 RGB: the colour at its full size, of the camera in `FrameReader.picture_cameras`."""
 
 
 class FrameWriter:
     """Writes frames in time order. Used as a context manager; a file that was left by an exception stays unfinished.
 
     `camera` is the camera of frames that name none; `cameras` (name -> camera) are those of frames that do, and
-    `baselines` (name -> metres) those of stereo pairs. `labels` announces a label stream. `world_up="z"` records that
-    z of the poses' world is up (what our generated logs know); `"unknown"` records that it is not known. `registered`
-    records whether colour and depth pixels see the same ray. `label_table` says what the labels mean.
+    `baselines` (name -> metres) those of stereo pairs. `labels` announces a label stream, `confidence` one of
+    confidence, `picture_cameras` (name -> camera) pictures at their full size. `world_up="z"` records that z of the
+    poses' world is up (what our generated logs know); `"unknown"` records that it is not known. `registered` records
+    whether colour and depth pixels see the same ray. `label_table` says what the labels mean.
     """
 
     def __init__(
@@ -88,15 +90,18 @@ class FrameWriter:
         label_table: Iterable[LabelEntry] = (),
         cameras: Mapping[str, Camera] | None = None,
         baselines: Mapping[str, float] | None = None,
+        confidence: bool = False,
+        picture_cameras: Mapping[str, Camera] | None = None,
     ) -> None:
         self.camera = camera
         self.cameras = dict(cameras) if cameras else {CAMERA_FRAME: camera}
         self.baselines = dict(baselines or {})
+        self.picture_cameras = dict(picture_cameras or {})
         for name in self.cameras:
             if not CAMERA_NAME.fullmatch(name):
                 raise ValueError(f"camera name {name!r} is not made of letters, digits and underscores")
         self.frame_count = 0
-        self._labels = labels
+        self._labels, self._confidence = labels, confidence
         self._last_time = -1
         self._file = Path(path).open("wb")  # noqa: SIM115 (closed in __exit__)
         self._writer = McapWriter(self._file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
@@ -104,11 +109,14 @@ class FrameWriter:
         self._schemas: dict[Any, int] = {}
         self._channels: dict[str, int] = {}
         for name in self.cameras:
-            for stream in ("color", "depth", *(("labels",) if labels else ()), "calibration"):
+            announced = (
+                *("color", "depth", *(("labels",) if labels else ()), "calibration"),
+                *(("right", "right_calibration") if name in self.baselines else ()),
+                *(("confidence",) if confidence else ()),
+                *(("picture", "picture_calibration") if name in self.picture_cameras else ()),
+            )
+            for stream in announced:
                 self._register(f"/{name}/{stream}", MESSAGE_TYPES[stream])
-            if name in self.baselines:
-                self._register(f"/{name}/right", CompressedImage)
-                self._register(f"/{name}/right_calibration", CameraCalibration)
         self._register(TRANSFORMS, FrameTransforms)
         metadata = {"world_frame": WORLD_FRAME, "world_up": world_up, "registered": "yes" if registered else "no"}
         self._writer.add_metadata(WORLD_METADATA, metadata)
@@ -142,13 +150,16 @@ class FrameWriter:
         labels: np.ndarray | None = None,
         *,
         right: np.ndarray | bytes | None = None,
+        confidence: np.ndarray | None = None,
+        picture: np.ndarray | bytes | None = None,
         camera_name: str | None = None,
     ) -> None:
         """Append a frame at `time` [s] of the camera called `camera_name` (default: the first).
 
-        `color` and `right` are (H, W, 3) uint8 RGB, or JPEG or PNG bytes that are stored as they are; `depth` is
-        (H, W) float [m] (0, NaN, infinite and over 65.534 m are invalid) or uint16 [mm]; `labels` is (H, W) integer
-        < 65536; `world_from_camera` is (4, 4) rigid. Raises ValueError for a wrong shape, time, camera or pose.
+        `color` and `right` are (H, W, 3) uint8 RGB, or JPEG or PNG bytes that are stored as they are, and so is
+        `picture`, at its own size; `depth` is (H, W) float [m] (0, NaN, infinite and over 65.534 m are invalid) or
+        uint16 [mm]; `labels` is (H, W) integer < 65536, `confidence` (H, W) uint8 0..2; `world_from_camera` is (4, 4)
+        rigid. Raises ValueError for a wrong shape, time, camera or pose.
         """
         name = camera_name or next(iter(self.cameras))
         if name not in self.cameras:
@@ -182,6 +193,20 @@ class FrameWriter:
             if labels.size and (labels.min() < 0 or labels.max() > 65535):
                 raise ValueError("labels are not within 0..65535")
             messages.append((f"/{name}/labels", foxglove.raw_message(stamp, labels, "mono16", name)))
+        if confidence is not None:
+            if not self._confidence:
+                raise ValueError("confidence was not announced: FrameWriter(..., confidence=True)")
+            self._check(confidence, camera, "confidence", (), np.uint8)
+            if confidence.max(initial=0) > MOST_CONFIDENT:
+                raise ValueError(f"confidence is not within 0..{MOST_CONFIDENT}")
+            messages.append((f"/{name}/confidence", foxglove.raw_message(stamp, confidence, "mono8", name)))
+        if picture is not None:
+            if name not in self.picture_cameras:
+                raise ValueError(f"camera {name!r} has no pictures: FrameWriter(..., picture_cameras=...)")
+            full_size = self.picture_cameras[name]
+            calibration = foxglove.calibration_message(stamp, full_size, name)
+            messages.append((f"/{name}/picture_calibration", calibration))
+            messages.append((f"/{name}/picture", self._picture(stamp, picture, full_size, name)))
         for topic, message in messages:  # nothing of a frame that was refused is in the file
             self._add(topic, stamp, message)
         self._last_time = stamp
@@ -191,7 +216,7 @@ class FrameWriter:
         if not isinstance(picture, bytes):
             self._check(picture, camera, "colour", (3,), np.uint8)
             picture = foxglove.encode_jpeg(picture)
-        return foxglove.color_message(stamp, picture, name)
+        return foxglove.color_message(stamp, without_orientation(picture), name)
 
     @staticmethod
     def _check(image: np.ndarray, camera: Camera, name: str, channels: tuple[int, ...], kind: Any) -> None:
@@ -218,8 +243,9 @@ class FrameReader:
             metadata = self._log.metadata
             self.world_up: str = metadata.get(WORLD_METADATA, {}).get("world_up", "unknown")
             """`z`, or `unknown`."""
-            self.label_table = _label_table(metadata.get(LABELS_METADATA, {}), self.path)
+            self.label_table = label_table(metadata.get(LABELS_METADATA, {}), self.path)
             self._cameras: dict[str, Camera] | None = None
+            self._picture_cameras: dict[str, Camera] | None = None
             self._baselines: dict[str, float] | None = None
         except BaseException:
             self._log.close()
@@ -249,8 +275,13 @@ class FrameReader:
         return np.array([stamp * 1e-9 for stamp, _, _ in self._index])
 
     @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each frame."""
+        return tuple(name for _, name, _ in self._index)
+
+    @property
     def streams(self) -> tuple[str, ...]:
-        """Which of color, depth, labels, pose some frame has."""
+        """Which of PIXEL_STREAMS and pose some frame has."""
         have = {stream for _, _, places in self._index for stream in places}
         return tuple(stream for stream in (*PIXEL_STREAMS, "pose") if stream in have)
 
@@ -258,14 +289,25 @@ class FrameReader:
     def cameras(self) -> dict[str, Camera]:
         """Every camera by name, in order of first appearance. Raises BadInput when the file holds no calibration."""
         if self._cameras is None:
-            cameras: dict[str, Camera] = {}
-            for _, name, places in self._index:
-                if name not in cameras and "calibration" in places:
-                    cameras[name] = _camera_of(self._decode("calibration", places["calibration"]), self.path)
+            cameras = self._calibrated("calibration")
             if not cameras:
                 raise BadInput(f"{self.path}: holds no camera calibration")
             self._cameras = cameras
         return self._cameras
+
+    @property
+    def picture_cameras(self) -> dict[str, Camera]:
+        """Camera -> the camera of its pictures at their full size, of those that have such pictures."""
+        if self._picture_cameras is None:
+            self._picture_cameras = self._calibrated("picture_calibration")
+        return self._picture_cameras
+
+    def _calibrated(self, stream: str) -> dict[str, Camera]:
+        cameras: dict[str, Camera] = {}
+        for _, name, places in self._index:
+            if name not in cameras and stream in places:
+                cameras[name] = camera_of(self._decode(stream, places[stream]), self.path)
+        return cameras
 
     @property
     def camera(self) -> Camera:
@@ -298,7 +340,7 @@ class FrameReader:
         return np.array([i for i, _ in posed], dtype=int), np.array([p for _, p in posed]).reshape(-1, 4, 4)
 
     def read(self, index: int, streams: Iterable[str] = ("color", "depth", "labels")) -> Frame:
-        """Return one frame with the pixel streams asked for (color, depth, labels, right).
+        """Return one frame with the pixel streams asked for (of PIXEL_STREAMS).
 
         Raises IndexError outside of the sequence, BadInput when it cannot be decoded.
         """
@@ -320,24 +362,27 @@ class FrameReader:
                 pose = foxglove.transform_matrix(transforms[0].translation, transforms[0].rotation)
             except ValueError as error:
                 raise BadInput(f"{self.path}: pose of frame {index}: {error}") from None
-        return Frame(
-            index, stamp * 1e-9, arrays["color"], arrays["depth"], arrays["labels"], pose, name, arrays["right"]
-        )
+        return Frame(index, stamp * 1e-9, **arrays, world_from_camera=pose, camera_name=name)
 
-    def encoded(self, index: int, stream: Literal["color", "right"] = "color") -> bytes | None:
-        """Return the stored JPEG or PNG of a frame, or None when it has none."""
+    def encoded(self, index: int, stream: Literal["color", "right", "picture"] = "color") -> bytes | None:
+        """Return the stored JPEG or PNG of a frame, or None when it has none.
+
+        It states no EXIF orientation, by which others would turn it under intrinsics that are not turned.
+        """
         places = self._index[index][2]
-        return bytes(self._decode(stream, places[stream]).data) if stream in places else None
+        return without_orientation(bytes(self._decode(stream, places[stream]).data)) if stream in places else None
 
     def _array(self, index: int, stream: str, message: Any) -> np.ndarray:
         try:
-            if stream in ("color", "right"):
+            if stream in ("color", "right", "picture"):
                 image = foxglove.decode_color(message.data)
                 if image is None:
                     raise ValueError("image cannot be decoded")
                 return image
             pixels = foxglove.raw_array(message)
-            return foxglove.millimetres_to_depth(pixels) if stream == "depth" else pixels.astype(np.uint16, copy=False)
+            if stream == "depth":
+                return foxglove.millimetres_to_depth(pixels)
+            return pixels.astype(np.uint8 if stream == "confidence" else np.uint16, copy=False)
         except ValueError as error:
             raise BadInput(f"{self.path}: {stream} of frame {index}: {error}") from None
 
@@ -345,7 +390,7 @@ class FrameReader:
         """Return channel -> (camera, stream); the camera of `/tf` is empty."""
         topics: dict[int, tuple[str, str]] = {}
         for channel in self._log.channels.values():
-            match = _TOPIC.fullmatch(channel.topic)
+            match = TOPIC.fullmatch(channel.topic)
             if match is None and channel.topic != TRANSFORMS:
                 continue
             topics[channel.id] = (match[1], match[2]) if match else ("", "pose")
@@ -389,17 +434,3 @@ def require_depth(sequence: Sequence) -> None:
             if "right" in streams
             else "record depth, or a stereo pair",
         )
-
-
-def _camera_of(message: Any, path: Path) -> Camera:
-    if len(message.K) != 9 or message.K[0] <= 0 or message.K[4] <= 0:
-        raise BadInput(f"{path}: calibration has no focal lengths (K = {list(message.K)})")
-    fx, _, cx, _, fy, cy, *_ = message.K
-    return Camera.of_outside(path, width=message.width, height=message.height, fx=fx, fy=fy, cx=cx, cy=cy)
-
-
-def _label_table(table: dict[str, str], path: Path) -> tuple[LabelEntry, ...]:
-    try:
-        return tuple(LabelEntry(instance=int(key), class_name=table[key]) for key in sorted(table, key=int))
-    except ValueError:
-        raise BadInput(f"{path}: metadata record {LABELS_METADATA!r} has a key that is no instance number") from None

@@ -16,12 +16,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import trimesh
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.gltf_extensions import CONVERTER, refuse_extensions
 from scenewright.stages.kit.formats.image_headers import LARGEST_IMAGE, image_size, may_be_decoded
 
 LARGEST_FILE = 4 * 2**30
@@ -82,10 +83,41 @@ def mesh_of_bytes(
             _check_counts(*_COUNTS[suffix](data), most_triangles, most_vertices)
         mesh = None if empty else _parse(data, suffix.removeprefix("."))
     except BadInput as error:
-        raise BadInput(f"{path}: {error.message}", hint=hint) from None
+        raise BadInput(f"{path}: {error.message}", hint=error.hint or hint) from None
     mesh = mesh or trimesh.Trimesh(process=False)
     _check_mesh(mesh, path, may_be_empty=may_be_empty, hint=hint)
     return mesh if len(mesh.faces) else trimesh.Trimesh(mesh.vertices, np.zeros((0, 3), np.int64), process=False)
+
+
+class Cloud(NamedTuple):
+    """points (N, 3) float, colors (N, 3) uint8, grey where the file has none, and whether points have a label."""
+
+    points: np.ndarray
+    colors: np.ndarray
+    labelled: bool
+
+
+def read_cloud(path: Path, *, hint: str) -> Cloud | None:
+    """Return the points of a PLY file without faces, None for one with faces. Raises BadInput as `read_mesh` does."""
+    data = file_content(Path(path), LARGEST_FILE, hint=hint)
+    header = data[:LARGEST_HEADER].partition(b"end_header")[0]
+    try:
+        if _check_ply(data) or re.search(rb"^[ \t]*element[ \t]+face[ \t]+0*[1-9]", header, re.MULTILINE):
+            return None
+        loaded = trimesh.load(io.BytesIO(data), file_type="ply", process=False)
+    except BadInput as error:
+        raise BadInput(f"{path}: {error.message}", hint=hint) from None
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BadInput(f"{path}: cannot be read as points: {reason:.120}", hint=hint) from None
+    points = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=float)
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points) or not np.isfinite(points).all():
+        raise BadInput(f"{path}: holds no points, or some that are not finite", hint=hint)
+    colors = np.asarray(getattr(loaded, "colors", ()))
+    if colors.ndim != 2 or len(colors) != len(points) or colors.shape[1] < 3:
+        colors = np.full(points.shape, 160, np.uint8)
+    labelled = re.search(rb"^[ \t]*property[ \t]+\S+[ \t]+label\s*$", header, re.MULTILINE) is not None
+    return Cloud(points, colors[:, :3].astype(np.uint8), labelled)
 
 
 def meshes_of_glb(
@@ -106,15 +138,18 @@ def meshes_of_glb(
         scene = trimesh.load(io.BytesIO(data), file_type="glb", process=False, force="scene")
         meshes = [mesh for mesh in cast(trimesh.Scene, scene).dump() if isinstance(mesh, trimesh.Trimesh)]
     except BadInput as error:
-        raise BadInput(f"{where}: {error.message}", hint=hint) from None
+        raise BadInput(f"{where}: {error.message}", hint=error.hint or hint) from None
     except Exception as error:  # trimesh raises whatever its parsers raise
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"{where}: cannot be read as a mesh: {reason:.120}", hint=hint) from None
+        raise BadInput(f"{where}: {_torn('glTF')}", hint=hint) from error
     if not meshes:
         raise BadInput(f"{where}: holds no triangles", hint=hint)
     for mesh in meshes:
         _check_mesh(mesh, where, may_be_empty=False, hint=hint)
     return meshes
+
+
+def _torn(kind: str) -> str:
+    return f"cannot be read as {kind}: it is torn, or its parts do not fit what it declares"
 
 
 def _check_counts(triangles: int, vertices: int, most_triangles: int, most_vertices: int) -> None:
@@ -154,8 +189,7 @@ def _load_mesh(data: bytes, kind: str) -> trimesh.Trimesh | None:
         # From memory and without a resolver, so that names inside the file lead nowhere.
         loaded = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
     except Exception as error:  # trimesh raises whatever its parsers raise
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"cannot be read as a mesh: {reason:.120}") from None
+        raise BadInput(_torn(kind.upper())) from error
     if isinstance(loaded, trimesh.Trimesh):
         return loaded
     if isinstance(loaded, trimesh.PointCloud):
@@ -175,6 +209,8 @@ def _check_ply(data: bytes) -> bool:
         if not count.isdigit() or len(count) > 18 or int(count) > body:
             raise BadInput(f"declares {count[:20]!r} of {name[:20]!r}, but holds {body} bytes")
         vertices += int(count) if name == b"vertex" else 0
+    if b"tristrips" in dict(counts):
+        raise BadInput("its triangles are strips (tristrips), which are not read", hint="export it from MeshLab")
     return vertices == 0
 
 
@@ -224,7 +260,8 @@ def _refuse_as_broken() -> Iterator[None]:
     try:
         yield
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
-        raise BadInput(f"GLB description is broken: {type(error).__name__}: {error}"[:160]) from None
+        what = f"{error} is missing" if isinstance(error, KeyError) else f"{type(error).__name__}: {error}"
+        raise BadInput(f"GLB description is broken: {what}"[:160]) from None
 
 
 def _check_glb(data: bytes) -> bool:
@@ -239,6 +276,9 @@ def _check_glb(data: bytes) -> bool:
         raise BadInput(f"GLB version {version} declares {total} bytes and {length} of JSON, the file has {len(data)}")
     with _refuse_as_broken():
         tree = _glb_tree(data)
+        refuse_extensions(tree, "IN.glb")
+        if any("sparse" in accessor for accessor in tree.get("accessors", ())):
+            raise BadInput("an array is sparse, which is not read here", hint=f"{CONVERTER} copy IN.glb OUT.glb")
         views = [
             (whole_number(view.get("byteOffset", 0)), whole_number(view["byteLength"]))
             for view in tree.get("bufferViews", ())
@@ -323,7 +363,7 @@ def gltf_pixels(data: bytes, where: str, *, hint: str = "make the artifact again
         with _refuse_as_broken():
             return _pixels(data)
     except BadInput as error:
-        raise BadInput(f"{where}: {error.message}", hint=hint) from None
+        raise BadInput(f"{where}: {error.message}", hint=error.hint or hint) from None
 
 
 def _pixels(data: bytes) -> int:

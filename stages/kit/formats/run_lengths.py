@@ -23,8 +23,6 @@ def decode_rle(encoding: Any, shape: tuple[int, int]) -> np.ndarray:
     negative, no integers, or do not add up to the picture.
     """
     size = encoding.get("size") if isinstance(encoding, dict) else None
-    if isinstance(encoding, list):
-        raise BadInput("its segmentation is a polygon", hint="write RLE (pycocotools.mask.encode)")
     if not isinstance(size, list) or len(size) != 2 or "counts" not in encoding:
         raise BadInput("its segmentation is no RLE ({size, counts})", hint="pycocotools.mask.encode writes one")
     if size != [shape[0], shape[1]]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_text
+from scenewright.stages.kit.formats.stamps import read_column
 from scenewright.stages.kit.geometry.transforms import is_rigid
 from scipy.spatial.transform import Rotation
 
@@ -58,6 +61,49 @@ def read_tum(path: Path) -> tuple[np.ndarray, np.ndarray]:
             hint="sort the trajectory by time and remove duplicates",
         )
     return times, np.array(poses).reshape(-1, 4, 4)
+
+
+class StampedRows(NamedTuple):
+    """The usable lines of somebody's trajectory."""
+
+    stamps: np.ndarray
+    """(N,) int64 [ns], in file order."""
+    poses: np.ndarray
+    """(N, 4, 4) world_from_camera."""
+    notes: tuple[str, ...]
+    """Unit of the stamps where it is not seconds, and lines that are no poses."""
+
+
+def read_stamped_rows(path: Path) -> StampedRows:
+    """Read `t tx ty tz qx qy qz qw` lines that nobody vouches for; t in seconds to nanoseconds.
+
+    Lines that are no pose are left out and counted in the notes. Raises BadInput for a wrong number of columns, or what
+    is no number.
+    """
+    stamps, poses, problems = [], [], Counter[str]()
+    rows = number_rows(path, 8)
+    # Stamps since 1970 do not fit float64 to the nanosecond, so they are taken from the text.
+    texts = [line.split(None, 1)[0] for line in read_text(path).splitlines() if line.split("#", 1)[0].split()]
+    column = read_column(texts)
+    for (line, row), stamp in zip(rows, column.stamps, strict=True):
+        if stamp is None:
+            problems["no time"] += 1
+            continue
+        if not np.isfinite(row).all():
+            problems["not finite"] += 1
+            continue
+        try:
+            poses.append(transform_from_numbers(row[1:], f"{path}: line {line}"))
+        except BadInput:
+            problems["quaternion not of length 1"] += 1
+            continue
+        stamps.append(stamp)
+    notes = (f"{path.name}: {column.note}",) if column.note else ()
+    if problems:
+        listed = ", ".join(f"{reason}: {count}" for reason, count in sorted(problems.items()))
+        bad_lines = f"WARNING: {sum(problems.values())} of {len(rows)} lines of {path.name} are no poses ({listed})"
+        notes = (*notes, bad_lines)
+    return StampedRows(np.array(stamps, np.int64), np.array(poses).reshape(-1, 4, 4), notes)
 
 
 def transform_from_numbers(numbers: np.ndarray, where: str) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -10,8 +11,22 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.known_elements import unknown_elements
 from scenewright.stages.kit.formats.mesh_files import read_mesh
-from scenewright.stages.kit.formats.urdf_file import JOINT_TYPES, Link, Shape, Urdf, UrdfJoint, parse_urdf
+from scenewright.stages.kit.formats.urdf_file import (
+    COUNTED,
+    JOINT_TYPES,
+    KNOWN_URDF,
+    MAXIMUM_BYTES,
+    Link,
+    Primitive,
+    Shape,
+    Urdf,
+    UrdfJoint,
+    parse_urdf,
+)
+from scenewright.stages.kit.formats.xml_files import parse_xml
 
 NAME = re.compile(r"[A-Za-z0-9_.\-]+")
 READ_MESHES = (".obj", ".stl", ".ply", ".glb")
@@ -56,23 +71,33 @@ def check_urdf(path: Path, root: Path | None = None) -> list[Problem]:
             problems.append(Problem("friction", f"link {link.name!r}", "lateral friction is negative or not finite"))
         for shape in (*link.visuals, *link.collisions):
             problems += _check_shape(link.name, shape, path.parent, root or path.parent)
+        problems += [_primitive_fault(link.name, p) for p in link.primitives if not _has_size(p)]
     for joint in urdf.joints:
         problems += _check_joint(joint)
     return problems
 
 
 def advice(path: Path) -> list[Problem]:
-    """Return what is sound and still seldom meant: things that move, can be seen, and touch nothing (`no_collision`).
+    """Return what is sound and still seldom meant: things that move, can be seen, and touch nothing (`no_collision`),
+    shapes that readers differ on (`capsule`), elements that `library add` does not read (`unknown`).
 
     Raises BadInput for a file that cannot be read.
     """
     urdf = parse_urdf(Path(path))
     moving = {joint.child for joint in urdf.joints if joint.type != "fixed"}
-    return [
+    untouched = [
         Problem("no_collision", f"link {link.name!r}", "moves and has a shape to see, and none to touch")
         for link in urdf.links
         if link.name in moving and link.visuals and not link.collisions
     ]
+    capsules = [
+        Problem("capsule", f"link {link.name!r}", "a capsule is newer than many readers of URDF, which leave it out")
+        for link in urdf.links
+        if any(primitive.kind == "capsule" for primitive in link.primitives)
+    ]
+    robot = parse_xml(file_content(Path(path), MAXIMUM_BYTES), str(path))
+    unknown = [Problem("unknown", "robot", line) for line in unknown_elements([robot], KNOWN_URDF, COUNTED)]
+    return untouched + capsules + unknown
 
 
 def require_sound(path: Path, root: Path | None = None) -> None:
@@ -183,6 +208,19 @@ def _check_inertia(link: Link, must_have: bool) -> list[Problem]:
     return problems
 
 
+def _has_size(primitive: Primitive) -> bool:
+    return bool(primitive.sizes) and bool(np.isfinite(primitive.sizes).all()) and min(primitive.sizes) > 0
+
+
+def _primitive_fault(link: str, primitive: Primitive) -> Problem:
+    what = (
+        f"{primitive.kind} of size {primitive.sizes}"
+        if primitive.sizes
+        else f"URDF has no shape <{primitive.kind:.40}>"
+    )
+    return Problem("geometry", f"link {link!r}", what)
+
+
 def _check_shape(link: str, shape: Shape, folder: Path, root: Path) -> list[Problem]:
     element = f"link {link!r}"
     if not np.isfinite(shape.link_from_shape).all() or not np.isfinite(shape.scale):
@@ -201,11 +239,24 @@ def _check_shape(link: str, shape: Shape, folder: Path, root: Path) -> list[Prob
     except (OSError, ValueError, RuntimeError) as error:  # too long, with a zero byte, links in a circle
         return [Problem("mesh_outside", element, f"mesh {name!r:.80}: {getattr(error, 'strerror', None) or error}")]
     if "://" in name or PurePosixPath(name).is_absolute() or not target.is_relative_to(root) or target == root:
-        return [Problem("mesh_outside", element, f"mesh {name!r} is not a path inside the folder of the model")]
+        return [Problem("mesh_outside", element, _outside(name, folder, root))]
     if not exists:
         return [Problem("mesh_missing", element, f"mesh {name!r} does not exist")]
     reason = _mesh_fault(target)
     return [Problem("mesh_unreadable", element, f"mesh {name!r}: {reason}")] if reason else []
+
+
+def _outside(name: str, folder: Path, root: Path) -> str:
+    """Say that a mesh is not named by a path inside the folder, and which path it has there, sought by its end."""
+    parts = [part for part in PurePosixPath(name.partition("://")[2] or name).parts if part not in ("/", "..")]
+    places = [place.resolve() for place in (folder, *folder.resolve().parents) if place.resolve().is_relative_to(root)]
+    for start in range(len(parts)):
+        for place in places:
+            found = place.joinpath(*parts[start:])
+            if found.is_file() and found.resolve().is_relative_to(root):
+                path = os.path.relpath(found, folder.resolve())
+                return f"mesh {name!r} is not a path inside the folder of the model; write {path!r}"
+    return f"mesh {name!r} is not a path inside the folder of the model, and not found there by its end"
 
 
 def _mesh_fault(path: Path) -> str:

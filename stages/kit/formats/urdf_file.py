@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_content
+from scenewright.stages.kit.formats.known_elements import Table, plain_tag
 from scenewright.stages.kit.formats.xml_files import parse_xml
 from scenewright.stages.kit.geometry.solids import MassProperties
 from scenewright.stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
@@ -19,6 +20,23 @@ from scenewright.stages.kit.geometry.transforms import transform_from
 from scipy.spatial.transform import Rotation
 
 JOINT_TYPES = ("fixed", "floating", "revolute", "continuous", "prismatic")
+KNOWN_URDF: Table = {
+    "robot": frozenset(
+        {*("link", "joint", "material"), *("transmission", "gazebo", "ros2_control", "mujoco", "sensor")}
+    ),
+    "link": frozenset(
+        {*("inertial", "visual", "collision"), *("contact", "self_collision_checking", "gravity", "sensor")}
+    ),
+    "visual": frozenset({"origin", "geometry", "material"}),
+    "collision": frozenset({"origin", "geometry", "material", "contact_coefficients", "surface"}),
+    "joint": frozenset(
+        {*("origin", "parent", "child", "axis", "limit", "mimic"), *("dynamics", "calibration", "safety_controller")}
+        | {"joint_properties"}
+    ),
+}
+"""What is read, and what holds nothing of shape and motion (after urdfdom, ROS, Bullet)."""
+READ = ("mesh", "box")
+COUNTED = ("link", "joint", "visual", "collision")
 MAXIMUM_BYTES = 64 * 2**20
 """Largest URDF [bytes]; a bound, by eye."""
 
@@ -36,6 +54,15 @@ class Shape:
 
 
 @dataclass(frozen=True)
+class Primitive:
+    """A shape that is neither mesh nor box. Read to be checked; scenes have none."""
+
+    kind: str
+    sizes: tuple[float, ...]
+    """Radius, and length where the kind has one [m]; empty for a kind that URDF does not have."""
+
+
+@dataclass(frozen=True)
 class Link:
     """A rigid body: mass properties in its own frame, what it looks like, what it collides with."""
 
@@ -45,6 +72,7 @@ class Link:
     collisions: tuple[Shape, ...] = ()
     friction: float | None = None
     """Sliding friction of its surface on one of the same kind; None when the file says nothing."""
+    primitives: tuple[Primitive, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -257,7 +285,19 @@ def _parse_link(element: ElementTree.Element, path: Path) -> Link:
     if sliding is not None:
         value = float(_floats(sliding.get("value"), 1, f"{where}: lateral_friction")[0])
         friction = value * abs(value)  # a negative one stays negative, for the check to find
-    return Link(name, properties, tuple(s for s in visuals if s), tuple(s for s in collisions if s), friction)
+    shapes = [
+        shape for kind in ("visual", "collision") for child in element.findall(kind) for shape in child.iter("geometry")
+    ]
+    primitives = tuple(_parse_primitive(child, where) for shape in shapes for child in shape if child.tag not in READ)
+    return Link(
+        name, properties, tuple(s for s in visuals if s), tuple(s for s in collisions if s), friction, primitives
+    )
+
+
+def _parse_primitive(element: ElementTree.Element, where: str) -> Primitive:
+    keys = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
+    sizes = [float(_floats(element.get(key), 1, f"{where}: {key}")[0]) for key in keys.get(element.tag, ())]
+    return Primitive(plain_tag(element), tuple(sizes))
 
 
 def joint_ends(element: ElementTree.Element, where: str) -> tuple[str, str]:

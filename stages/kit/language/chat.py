@@ -102,11 +102,11 @@ class Chat:
         if asked_count >= settings.call_budget:
             numbers = {"asked": float(asked_count), "budget": float(settings.call_budget)}
             message = f"{self.backend.label}: asked {asked_count} times, as often as --call-budget allows"
-            raise self._failure("call_budget", message, numbers, "raise --call-budget")
+            raise self._failure("call_budget", message, numbers, "raise it")
         if self.tokens >= settings.token_budget:
             numbers = {"tokens": float(self.tokens), "budget": float(settings.token_budget)}
             message = f"{self.backend.label}: {self.tokens} tokens used of --token-budget {settings.token_budget}"
-            raise self._failure("token_budget", message, numbers, "raise --token-budget")
+            raise self._failure("token_budget", message, numbers, "raise it")
 
     def _ask(self, messages: tuple[Message, ...], schema: ReplySchema[Any]) -> RawReply:
         settings = self.settings

@@ -94,6 +94,12 @@ class Finder:
         order = sorted(best, key=lambda region: (-best[region][0], region))[:MOST_ANSWERS]
         return [replace(self._result_of(first, k), probability=best[k][0], other=best[k][1]) for k in order]
 
+    def cannot_tell(self, *texts: str) -> bool:
+        """Whether the encoder cannot say that a room lacks what texts name: one has a word that it never read and that
+        is in no class of the map, or it has learned no pictures like these."""
+        in_classes = {word for region in self.info.regions for word in region.class_name.split("_")}
+        return self.is_strange or any(set(self.encoder.unread(text)) - in_classes for text in texts)
+
     def place(self, region: int) -> np.ndarray:
         """Return (3,) where an answer points [m]: of the Gaussians of a piece the one nearest their median, as the
         middle of a box about a corner of walls lies in the air; of an entity the middle of its box."""

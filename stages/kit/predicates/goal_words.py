@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+Part = tuple[str, tuple[str, ...]]
+"""A phrase with <1>, <2> in place of objects, and these."""
 
-def goal_phrases(sentence: str, names: Iterable[str]) -> list[tuple[str, tuple[str, ...]]]:
+
+def goal_phrases(sentence: str, names: Iterable[str]) -> list[Part]:
     """Return the parts of a goal that `and` joins, each as text with <1>, <2> and its objects."""
     known_names = set(names)
     phrases = []

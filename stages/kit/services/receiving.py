@@ -71,8 +71,7 @@ class BoundedServer(ThreadingHTTPServer):
             super().__init__((host, port), handler)
         except (OSError, OverflowError) as error:
             raise MachineFailure(
-                f"{host:.80}:{port}: {getattr(error, 'strerror', None) or error}",
-                hint="choose another --port or --host",
+                f"{host:.80}:{port}: {getattr(error, 'strerror', None) or error}", hint="choose another port or address"
             ) from None
         except (ValueError, TypeError):  # half a character, a zero byte, a label of more than 63 letters
             raise UsageError(f"{host!r:.80} is no name of a host") from None

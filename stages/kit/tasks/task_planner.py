@@ -2,7 +2,8 @@
 
 The default is after LAMA (Richter & Westphal 2010): greedy best-first search that takes turns between h_FF and the
 count of landmarks left, with queues of their own for preferred actions, evaluation deferred until a state is expanded;
-then weighted A* with falling weights looks for shorter plans, within a few hundred states each. h_add, h_max: Bonet &
+then weighted A* with falling weights looks for shorter plans, within a few hundred states each, and goes on while a
+plan is longer than may be done. h_add, h_max: Bonet &
 Geffner 2001. Everything is counted in expanded states, so that the same task gives the same plan.
 """
 
@@ -46,11 +47,13 @@ def plan_task(
     heuristic: Heuristic = "landmarks",
     limit: int = 50_000,
     improvement: int = IMPROVEMENT,
+    longest: int | None = None,
 ) -> TaskPlan:
     """Search for a plan; every action costs 1. `limit` bounds the expanded states; ties fall to the older state.
 
     `max` gives a shortest plan; `landmarks` a good one fast, for which `improvement` bounds the states that each search
-    for a shorter one expands.
+    for a shorter one expands. While a plan has more than `longest` actions, further rounds look for shorter ones, each
+    with twice the states of the one before, until they have expanded `limit` states again.
     """
     task = relax(problem, actions)
     estimate = Estimator(task, "max")
@@ -59,21 +62,26 @@ def plan_task(
     if lost:
         return TaskPlan(None, 0, True, lost)
     if heuristic == "landmarks":
-        return _landmark_plan(task, limit, min(improvement, limit))
+        return _landmark_plan(task, limit, min(improvement, limit), longest)
     return _a_star(task, Estimator(task, heuristic), limit)
 
 
-def _landmark_plan(task: Relaxed, limit: int, improvement: int) -> TaskPlan:
+def _landmark_plan(task: Relaxed, limit: int, improvement: int, longest: int | None) -> TaskPlan:
     search = LazySearch(task, find_landmarks(task))
     first = search.run(None, limit, None)
     if first.plan is None:
         return TaskPlan(None, first.expanded, first.exhausted)
     plan, expanded = first.plan, first.expanded
-    for weight in WEIGHTS:
-        better = search.run(weight, improvement, len(plan))
-        expanded += better.expanded
-        plan = plan if better.plan is None else better.plan
-    return TaskPlan([task.actions[action] for action in plan], expanded, False)
+    in_all = 0 if longest is None else expanded + limit
+    while True:
+        for weight in WEIGHTS:
+            better = search.run(weight, improvement, len(plan))
+            expanded += better.expanded
+            plan = plan if better.plan is None else better.plan
+        done = longest is None or len(plan) <= longest or better.exhausted or expanded >= in_all
+        if done:
+            return TaskPlan([task.actions[action] for action in plan], expanded, False)
+        improvement = min(2 * improvement, in_all - expanded)
 
 
 def _a_star(task: Relaxed, estimate: Estimator, limit: int) -> TaskPlan:

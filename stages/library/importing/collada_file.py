@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.kit.formats.known_elements import LONGEST_TAG
 from scenewright.stages.kit.formats.xml_files import parse_xml
 from scenewright.stages.library.importing.limits import MOST_VERTICES, Allowance
 from scenewright.stages.library.importing.source_folder import long_row
@@ -26,6 +27,11 @@ MOST_STEPS = 2_000_000
 """Elements that are looked at, those of an instance each time that it is instanced."""
 DEEPEST_NODES = 60
 """Deepest nesting of nodes; a bound against damaged files."""
+WITHOUT_SHAPE = frozenset(
+    {*("matrix", "translate", "rotate", "scale", "lookat", "skew"), *("instance_camera", "instance_light")}
+    | {*("asset", "extra")}
+)
+"""What stands in a node beside geometry and nodes: transforms, and what holds no shape."""
 UP_AXES = {"X_UP": (1.0, 0.0, 0.0), "Y_UP": (0.0, 1.0, 0.0), "Z_UP": (0.0, 0.0, 1.0)}
 """Up directions by the names that COLLADA gives them."""
 
@@ -182,6 +188,10 @@ class _Reader:
                 yield from self._node(target, pose, depth + 1)
             elif child.tag == "instance_controller":
                 self.left_out.add("skinned geometry")
+            elif child.tag in ("instance_geometry", "instance_node"):
+                self.left_out.add(f"{child.tag} of another file, or of nothing")
+            elif child.tag not in WITHOUT_SHAPE:
+                self.left_out.add(child.tag[:LONGEST_TAG])
 
     def _geometry(
         self, geometry: ElementTree.Element, pose: np.ndarray, name: str, bound: dict[str, str]
@@ -196,8 +206,10 @@ class _Reader:
                 patch = self._patch(element, pose, name, bound)
                 if patch is not None:
                     yield patch
-            elif element.tag in ("lines", "linestrips", "tristrips", "trifans"):
-                self.left_out.add(element.tag)
+                if element.find("ph") is not None:
+                    self.left_out.add("polygons with holes")
+            elif element.tag not in ("source", "vertices", "extra"):
+                self.left_out.add(element.tag[:LONGEST_TAG])
 
     def _source(self, reference: str) -> np.ndarray:
         if reference not in self.sources:

@@ -18,6 +18,8 @@ from scenewright.stages.library.importing.loose_models import (
 )
 from scenewright.stages.library.importing.mesh_reading import MESH_SUFFIXES
 from scenewright.stages.library.importing.mjcf_models import is_mjcf, read_mjcf_models
+from scenewright.stages.library.importing.other_formats import other_formats
+from scenewright.stages.library.importing.parts_of_others import lone_parts, older_versions, parts_of_others
 from scenewright.stages.library.importing.sdf_models import read_sdf_models
 from scenewright.stages.library.importing.source_folder import SourceFolder
 from scenewright.stages.library.importing.source_model import SourceModel
@@ -48,7 +50,11 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
     files = folder.files()
     count = 0
     claimed = _Claimed()
+    named = [path for path in files if _is_text(path)]
+    parts = parts_of_others(folder, named) | older_versions(folder, named)
     for path in files:
+        if parts and path.resolve() in parts:
+            continue
         if not _is_text(path):
             if path.suffix.lower() in (*MESH_SUFFIXES, *DESCRIPTIONS):
                 yield Unread(folder.relative(path), "its name is no UTF-8 (rename it)")
@@ -71,6 +77,12 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
         if count > MOST_MODELS:
             raise BadInput(f"{folder.root}: more than {MOST_MODELS} models", hint="import its parts one by one")
         yield _try_to_read(folder, path, partial(read_loose_model, folder, path))
+    if count == 0:
+        for path in lone_parts(folder, files):
+            reason = "a part of an MJCF that no file here includes (add the file that includes it)"
+            yield Unread(folder.relative(path), reason)
+    for source, reason in other_formats(folder, files):
+        yield Unread(source, reason)
 
 
 @dataclass(frozen=True)
@@ -99,9 +111,7 @@ def _read_claimed(folder: SourceFolder, path: Path, claimed: _Claimed) -> Iterat
     elif suffix in (".sdf", ".world"):
         yield from _several(folder, path, lambda: read_sdf_models(folder, path))
     elif suffix in (".xml", ".mjcf"):
-        yield from _several(
-            folder, path, lambda: read_mjcf_models(folder, path) if _whole_mjcf(folder, path) else iter(())
-        )
+        yield from _several(folder, path, lambda: _models_of_xml(folder, path))
     elif path.name == SHAPENET_FILE and is_shapenet_table(folder, path):
         try:
             with told_refusals(folder.relative(path)):
@@ -114,14 +124,23 @@ def _read_claimed(folder: SourceFolder, path: Path, claimed: _Claimed) -> Iterat
             yield _try_to_read(folder, mesh, partial(read_shapenet_model, folder, mesh, row))
 
 
-def _whole_mjcf(folder: SourceFolder, path: Path) -> bool:
-    """Whether an XML file is an MJCF model; one that is no XML is so only when it is called .mjcf."""
+def _models_of_xml(folder: SourceFolder, path: Path) -> Iterator[SourceModel]:
+    """Yield the models of an XML file, whichever description it is; none of one that is another thing.
+
+    Raises BadInput; for a file that is no XML only when it says that it is a model.
+    """
     try:
-        return is_mjcf(folder.read_xml(path))
+        root = folder.read_xml(path)
     except BadInput:
         if path.suffix.lower() == ".mjcf" or b"<mujoco" in folder.read(path)[:4096]:
             raise
-        return False
+        return
+    if is_mjcf(root):
+        yield from read_mjcf_models(folder, path)
+    elif root.tag == "robot":
+        yield read_urdf_model(folder, path)
+    elif root.tag == "sdf":
+        yield from read_sdf_models(folder, path)
 
 
 def _try_to_read(folder: SourceFolder, path: Path, read_models: Callable[[], SourceModel]) -> SourceModel | Unread:

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.stages.kit.geometry.file_axes import (
+    AXES,
+    UNITS,
+    Direction,
+    axis_name,
+    clean,
+    size_text,
+    size_under,
+    unit_name,
+    upright_rotation,
+)
+from scenewright.stages.kit.known_names import UnitName
 from scenewright.stages.library.importing.classes import UsualSize
-from scenewright.stages.library.importing.source_model import Declared, Direction
+from scenewright.stages.library.importing.source_model import Declared
 
-UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "foot": 0.3048}
-"""Metres a unit."""
-LIKELY_UNITS = ("m", "cm", "mm", "inch")
-AXES: dict[str, Direction] = {
-    "+x": (1.0, 0.0, 0.0),
-    "-x": (-1.0, 0.0, 0.0),
-    "+y": (0.0, 1.0, 0.0),
-    "-y": (0.0, -1.0, 0.0),
-    "+z": (0.0, 0.0, 1.0),
-    "-z": (0.0, 0.0, -1.0),
-}
-"""Unit directions by the names that options give them."""
+LIKELY_UNITS: tuple[UnitName, ...] = ("m", "cm", "mm", "inch")
 SMALLEST_THING, LARGEST_THING = 0.01, 10.0
 """Largest extent of things of any class [m]."""
 Y_UP, Z_UP = AXES["+y"], AXES["+z"]
@@ -39,11 +41,19 @@ class Choice:
     findings: tuple[str, ...] = ()
 
 
-def choose(unit: Declared, up: Declared, points: np.ndarray, usual: UsualSize | None, y_first: bool) -> Choice:
-    """Return the unit and the up axis of a model with the given points (N, 3).
+def choose(
+    unit: Declared,
+    up: Declared,
+    points_in: Callable[[float], np.ndarray],
+    usual: UsualSize | None,
+    y_first: bool,
+    told_up: Direction | None = None,
+) -> Choice:
+    """Return the unit and the up axis of a model; `points_in` gives its points (N, 3) [m] for a unit.
 
     What is declared is taken, and only questioned. What is not is the first of metres, centimetres, millimetres and
-    inches, with the likelier of y and z up (`y_first`), that makes the size usual for the class.
+    inches, with the likelier of y and z up (`y_first`), that makes the size usual for the class; `told_up`, which the
+    shape tells, is the likeliest.
     """
     ups = (Y_UP, Z_UP) if y_first else (Z_UP, Y_UP)
     declared_unit = unit.value if isinstance(unit.value, float) else None
@@ -51,55 +61,43 @@ def choose(unit: Declared, up: Declared, points: np.ndarray, usual: UsualSize | 
     findings: list[str] = []
     units = [declared_unit] if declared_unit is not None else [UNITS[name] for name in LIKELY_UNITS]
     directions = [declared_up] if declared_up is not None else list(ups)
+    if declared_up is None and told_up in directions and told_up != directions[0]:
+        directions = [told_up, *(direction for direction in directions if direction != told_up)]
+        up = replace(up, origin="guessed")
+        findings.append(f"nothing declares its up axis: it has a back rest with {axis_name(told_up)} up alone")
     taken_unit, taken_up = units[0], directions[0]
     unit_origin, up_origin = unit.origin, up.origin
     if usual is not None and (len(units) > 1 or len(directions) > 1):
-        fitting = [(u, d) for u in units for d in directions if usual.fits(size_under(points, u, d))]
+        fitting = [(u, d) for u in units for d in directions if usual.fits(size_under(points_in(u), d))]
         if fitting and fitting[0] != (taken_unit, taken_up):
             unit_origin = "guessed" if fitting[0][0] != taken_unit else unit_origin
             up_origin = "guessed" if fitting[0][1] != taken_up else up_origin
             taken_unit, taken_up = fitting[0]
             choice_words = f"{unit_name(taken_unit)}, {axis_name(taken_up)} up"
             findings.append(f"nothing declares its {_what(unit, up)}: {choice_words} make its size usual")
-    size = size_under(points, taken_unit, taken_up)
+    size = size_under(points_in(taken_unit), taken_up)
     if usual is None and not SMALLEST_THING <= float(size.max()) <= LARGEST_THING:
         findings.append(f"size {size_text(size)} is unusual for anything in a room (--unit)")
     if usual is not None and not usual.fits(size, SLACK):
-        findings.append(
-            f"size {size_text(size)} is unusual for its class{_better(points, taken_unit, taken_up, usual)}"
-        )
+        better = _better(points_in, taken_unit, taken_up, usual)
+        findings.append(f"size {size_text(size)} is unusual for its class{better}")
     return Choice(taken_unit, unit_origin, taken_up, up_origin, tuple(findings))
 
 
 def _what(unit: Declared, up: Declared) -> str:
-    missing = [name for name, entry in (("unit", unit), ("up axis", up)) if entry.origin == "assumed"]
+    missing = [name for name, entry in (("unit", unit), ("up axis", up)) if entry.value is None]
     return " and ".join(missing)
 
 
-def _better(points: np.ndarray, unit: float, up: Direction, usual: UsualSize) -> str:
+def _better(points_in: Callable[[float], np.ndarray], unit: float, up: Direction, usual: UsualSize) -> str:
     """Return a hint: in which unit, or with which axis up, the size would be usual."""
     for name in LIKELY_UNITS:
-        if UNITS[name] != unit and usual.fits(size_under(points, UNITS[name], up)):
+        if UNITS[name] != unit and usual.fits(size_under(points_in(UNITS[name]), up)):
             return f"; in {name} it would be usual (--unit {name})"
     for other_up in (Z_UP, Y_UP):
-        if other_up != up and usual.fits(size_under(points, unit, other_up)):
+        if other_up != up and usual.fits(size_under(points_in(unit), other_up)):
             return f"; with {axis_name(other_up)} up it would be usual (--up {axis_name(other_up)})"
     return ""
-
-
-def size_under(points: np.ndarray, unit: float, up: Direction) -> np.ndarray:
-    """Return the extents (3,) [m], the last one upwards, of points (N, 3) in a frame with this unit and up axis."""
-    return unit * np.ptp(points @ upright_rotation(up).T, axis=0)
-
-
-def upright_rotation(up: Direction) -> np.ndarray:
-    """Return the rotation (3, 3) that turns `up` to z, the shortest way."""
-    z, start = np.array([0.0, 0.0, 1.0]), np.asarray(up) / np.linalg.norm(up)
-    turn, cosine = np.cross(start, z), float(start @ z)
-    if np.linalg.norm(turn) < 1e-12:
-        return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
-    skew = np.array([[0, -turn[2], turn[1]], [turn[2], 0, -turn[0]], [-turn[1], turn[0], 0]])
-    return _clean(np.eye(3) + skew + skew @ skew / (1.0 + cosine))
 
 
 def model_rotation(up: Direction, front: Direction | None) -> np.ndarray:
@@ -112,28 +110,4 @@ def model_rotation(up: Direction, front: Direction | None) -> np.ndarray:
     if length < 1e-6:
         return upright
     cosine, sine = -y / length, -x / length  # the turn about z that takes (x, y) to (0, -1)
-    return _clean(np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1.0]]) @ upright)
-
-
-def _clean(rotation: np.ndarray) -> np.ndarray:
-    """Return the rotation with entries next to -1, 0 and 1 made exact: most models lie along their axes."""
-    rounded = np.round(rotation)
-    return np.where(np.abs(rotation - rounded) < 1e-9, rounded, rotation) + 0.0
-
-
-def unit_name(unit: float) -> str:
-    """Return `cm` for 0.01, the number of metres for an unnamed unit."""
-    return next((name for name, metres in UNITS.items() if abs(metres - unit) < 1e-9 * metres), f"{unit:g} m")
-
-
-def axis_name(direction: Direction) -> str:
-    """Return `+z` and the like, numbers for a direction along no axis."""
-    for name, axis in AXES.items():
-        if np.allclose(direction, axis, atol=1e-6):
-            return name
-    return ",".join(f"{v:.2f}" for v in direction)
-
-
-def size_text(size: np.ndarray) -> str:
-    """Return extents as `0.44 x 0.47 x 0.91 m`."""
-    return " x ".join(f"{v:.3g}" for v in size) + " m"
+    return clean(np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1.0]]) @ upright)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scenewright.stages.kit.geometry.file_axes import Direction
 from scenewright.stages.library.importing.placing import Part
-from scenewright.stages.library.importing.source_model import Direction
 
 FRONT_SHARE = 0.35
 """How far out of the middle, of the half extent, moving parts or a back rest lie to tell the front."""
@@ -38,14 +38,24 @@ def told_front(parts: Sequence[Part], class_name: str) -> tuple[Direction, str] 
         if front is not None:
             return front, "joints"
     if class_name in BACKED:
-        centers, areas = _face_centers(parts)
-        upper = centers[:, 2] > low[2] + 0.7 * (high[2] - low[2])
-        if areas[upper].sum() > 0:
-            back = np.average(centers[upper], axis=0, weights=areas[upper])
-            front = _dominant(-((back - middle) / half)[:2])
-            if front is not None:
-                return front, "back rest"
+        corners = [surface.vertices[surface.faces] for part in parts for surface in part.surfaces]
+        front = front_of_back_rest(np.concatenate(corners))
+        if front is not None:
+            return front, "back rest"
     return None
+
+
+def front_of_back_rest(corners: np.ndarray) -> Direction | None:
+    """Return where upright triangles (F, 3, 3) look, away from what rises at one side of them, or None."""
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9)
+    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    centers = corners.mean(axis=1)
+    upper = centers[:, 2] > low[2] + 0.7 * (high[2] - low[2])
+    if doubled[upper].sum() <= 0:
+        return None
+    back = np.average(centers[upper], axis=0, weights=doubled[upper])
+    return _dominant(-((back - middle) / half)[:2])
 
 
 def _drawer_direction(part: Part, size: np.ndarray) -> np.ndarray | None:
@@ -68,9 +78,3 @@ def _dominant(offset: np.ndarray) -> Direction | None:
     direction = [0.0, 0.0, 0.0]
     direction[axis] = float(np.sign(offset[axis]))
     return (direction[0], direction[1], direction[2])
-
-
-def _face_centers(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
-    corners = np.concatenate([surface.vertices[surface.faces] for part in parts for surface in part.surfaces])
-    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return corners.mean(axis=1), doubled

@@ -5,13 +5,13 @@ Parts hang on the body: what moves on a moving part is held fast on it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.library.importing.source_model import SourceJoint, SourceLink, SourceModel
+from scenewright.stages.library.importing.source_model import SourceJoint, SourceLink, SourceModel, Surface
 from scenewright.stages.library.modelling import BODY
 
 SMALLEST_RANGE = {"revolute": 1e-3, "prismatic": 1e-4}
@@ -57,6 +57,8 @@ def grouped(source: SourceModel) -> tuple[list[Group], list[str]]:
         name, head, root_from_link = waiting.pop(0)
         for joint in children.get(name, []):
             pose = root_from_link @ joint.parent_from_child
+            if joint.kind == "floating" and not _is_whole(links[name], children[name]):
+                findings.append(f"joint {joint.name!r:.40} floats: held fast")
             own_joint = _moving_joint(joint, findings)
             if own_joint is not None and head != roots[0]:
                 findings.append(f"joint {joint.name!r:.40} moves on a part that moves: held fast")
@@ -75,12 +77,14 @@ def grouped(source: SourceModel) -> tuple[list[Group], list[str]]:
     return groups, findings
 
 
+def _is_whole(parent: SourceLink, joints: Sequence[SourceJoint]) -> bool:
+    """Whether all of a model hangs on a parent without shape (`world`): it may then be put anywhere anyway."""
+    return len(joints) == 1 and not parent.visual and not parent.collision
+
+
 def _moving_joint(joint: SourceJoint, findings: list[str]) -> SourceJoint | None:
     """Return the joint as one that moves, or None for one that does not."""
     if joint.kind in ("fixed", "floating"):
-        return None
-    if joint.kind == "unknown":
-        findings.append(f"joint {joint.name!r:.40} is of a kind that is left out: held fast")
         return None
     if np.linalg.norm(joint.axis) < 1e-9:
         findings.append(f"joint {joint.name!r:.40} has an axis of length 0: held fast")
@@ -100,12 +104,19 @@ def _moving_joint(joint: SourceJoint, findings: list[str]) -> SourceJoint | None
 
 def source_points(groups: Sequence[Group]) -> np.ndarray:
     """Return the vertices (N, 3) of all parts as the file poses them, root frame and file's unit. Raises BadInput."""
-    points = [
-        apply(pose, surface.vertices)
-        for group in groups
-        for link, pose in group.links
-        for surface in link.visual or link.collision
-    ]
+    points = [apply(pose, surface.vertices) for surface, pose in _drawn(groups)]
     if not points:
         raise BadInput("holds no shapes")
     return np.concatenate(points)
+
+
+def source_corners(groups: Sequence[Group]) -> np.ndarray:
+    """Return the triangles (F, 3, 3) of all parts as the file poses them."""
+    return np.concatenate([apply(pose, surface.vertices)[surface.faces] for surface, pose in _drawn(groups)])
+
+
+def _drawn(groups: Sequence[Group]) -> Iterator[tuple[Surface, np.ndarray]]:
+    for group in groups:
+        for link, pose in group.links:
+            for surface in link.visual or link.collision:
+                yield surface, pose

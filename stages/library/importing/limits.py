@@ -27,15 +27,16 @@ MOST_SHAPES = 20_000
 """Boxes, meshes and groups of meshes of a model."""
 MOST_TRIANGLES_OF_A_FILE = 5 * MOST_TRIANGLES
 """Most triangles of all models that one description holds."""
+MOST_LINKS = 2_000
+"""Most links (bodies) of a model; 500 of them may move."""
+MOST_LINKS_OF_A_FILE = 5 * MOST_LINKS
+"""Most links of all models that one description holds."""
 MOST_FINDINGS = 40
 """Most findings that are kept of one model."""
 LONGEST_TEXT = 300
 """Longest name or finding [characters]."""
 SIMPLIFY = f"simplify it to at most {MOST_TRIANGLES} triangles and {MOST_SHAPES} shapes, or split it"
-REFUSALS = (
-    *(ArithmeticError, RecursionError, ValueError, QhullError, ShapelyError),
-    *(cv2.error, csv.Error, struct.error),
-)
+REFUSALS = (*(ArithmeticError, RecursionError, ValueError, ShapelyError), *(cv2.error, csv.Error, struct.error))
 """What geometry libraries and parsers raise for numbers that they cannot take (LinAlgError and UnicodeError are
 ValueErrors). IndexError, KeyError, TypeError are not among them: those are bugs of ours."""
 
@@ -48,12 +49,13 @@ def told_refusals(where: str) -> Iterator[None]:
             yield
     except BadInput:
         raise
+    except QhullError as error:
+        raise BadInput(f"{where}: a shape has no volume: it is flat, or a line", hint="mend it") from error
     except REFUSALS as error:
         reason = (str(error).strip().splitlines() or [""])[0]
         raise BadInput(
-            f"{where}: its geometry cannot be used: {type(error).__name__}: {reason:.120}",
-            hint="mend it, or leave it out (--mapping)",
-        ) from None
+            f"{where}: its geometry cannot be used: {type(error).__name__}: {reason:.120}", hint="mend it"
+        ) from error
 
 
 class Allowance:
@@ -79,10 +81,21 @@ class Allowance:
                 raise BadInput(f"{self._where}: more than {self._bounds[k]} {counted} in all", hint=SIMPLIFY)
 
 
+def refuse_many(where: str, things: str, count: int, most: int) -> None:
+    """Raise BadInput for more things than a description may hold, before any of them is read."""
+    if count > most:
+        raise BadInput(f"{where}: {count} {things}, more than {most}", hint="split it, or weld what does not move")
+
+
 def plain_text(text: str, longest: int = LONGEST_TEXT) -> str:
     """Return a name or a reason fit for a table and for JSON: control characters, and halves of them, written out."""
     text = text if len(text) <= longest else f"{text[:longest]}..."
     return cleaned(" ".join(text.split()))
+
+
+def one_color(what: str, name: str) -> str:
+    """Return the finding for a picture that a description puts on shapes, and that is not looked at."""
+    return f"{what} {name!r:.60} is not read: what it covers has one colour"
 
 
 def few_findings(findings: Sequence[str]) -> tuple[str, ...]:

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import opened
+from scenewright.stages.kit.geometry.file_axes import Direction
 from scenewright.stages.library.importing.mesh_reading import read_mesh_file
 from scenewright.stages.library.importing.source_folder import SourceFolder, numbers
-from scenewright.stages.library.importing.source_model import Declared, Direction, SourceLink, SourceModel
+from scenewright.stages.library.importing.source_model import Declared, SourceLink, SourceModel
 
 LARGEST_TABLE = 64 * 2**20
 """Largest metadata.csv [bytes]; a bound, by eye."""

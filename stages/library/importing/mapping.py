@@ -14,6 +14,7 @@ from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, first_problem
 from scenewright.schemas.outside import file_toml
 from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.known_names import AxisName, UnitName
 from scenewright.stages.library.importing.source_model import SourceModel
 
 LARGEST_FILE = 4 * 2**20
@@ -31,9 +32,9 @@ class Entry(Model):
 
     class_name: str = ""
     """A class of the vocabulary, or `skip`."""
-    unit: Literal["", "m", "dm", "cm", "mm", "inch", "foot"] = ""
-    up: Literal["", "+x", "-x", "+y", "-y", "+z", "-z"] = ""
-    front: Literal["", "+x", "-x", "+y", "-y", "+z", "-z"] = ""
+    unit: Literal["", UnitName] = ""
+    up: Literal["", AxisName] = ""
+    front: Literal["", AxisName] = ""
     contains: bool | None = None
 
 

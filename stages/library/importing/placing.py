@@ -14,13 +14,14 @@ import numpy as np
 from scenewright.schemas.base import as_vector
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.geometry.file_axes import Direction
 from scenewright.stages.kit.geometry.solids import Solid
 from scenewright.stages.kit.geometry.transforms import apply, transform_from
 from scenewright.stages.library.importing.frames import model_rotation
 from scenewright.stages.library.importing.grouping import Group
 from scenewright.stages.library.importing.handles import with_handle
 from scenewright.stages.library.importing.pieces import convex_pieces
-from scenewright.stages.library.importing.source_model import Direction, SourceModel, Surface
+from scenewright.stages.library.importing.source_model import SourceModel, Surface
 from scenewright.stages.library.modelling import BODY
 from scipy.spatial.transform import Rotation
 
@@ -80,8 +81,9 @@ def placed_parts(
                 raise BadInput(f"{source.source}: the root link has no shape")
             findings.append(f"part {group.name!r:.40} has no shape: left out")
             continue
-        _check_reach(source, collision_surfaces)
-        pieces, piece_findings = convex_pieces(collision_surfaces if collision_given else visual, decompose=decompose)
+        deciding = collision_surfaces if collision_given else visual
+        _check_reach(source, deciding, visual)
+        pieces, piece_findings = convex_pieces(deciding, decompose=decompose)
         if not pieces:
             pieces, piece_findings = convex_pieces(visual, decompose=decompose)
         findings += piece_findings
@@ -98,11 +100,17 @@ def placed_parts(
     return placed, findings
 
 
-def _check_reach(source: SourceModel, surfaces: Sequence[Surface]) -> None:
+def _check_reach(source: SourceModel, deciding: Sequence[Surface], visual: Sequence[Surface]) -> None:
     """Refuse what reaches so far that no hull of it has a volume. Raises BadInput."""
-    for surface in surfaces:
-        if not (np.abs(surface.vertices) < FARTHEST).all():
-            raise BadInput(f"{source.source}: collision shapes are not finite, or far away", hint="--collision visual")
+    if _within_reach(deciding):
+        return
+    if _within_reach(visual):
+        raise BadInput(f"{source.source}: collision shapes are not finite, or far away", hint="--collision visual")
+    raise BadInput(f"{source.source}: shapes are not finite, or far away", hint="correct their poses and sizes")
+
+
+def _within_reach(surfaces: Sequence[Surface]) -> bool:
+    return all((np.abs(surface.vertices) < FARTHEST).all() for surface in surfaces)
 
 
 def normal_limits(axis: np.ndarray, lower: float, upper: float) -> tuple[float, np.ndarray, float, float]:

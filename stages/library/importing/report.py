@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenewright.schemas.cad_library import ImportedModel
-from scenewright.stages.library.importing.frames import unit_name
+from scenewright.stages.kit.geometry.file_axes import unit_name
 
 HEADER = ("model", "class", "size [m]", "joints", "unit", "up", "front", "good for", "findings")
 LONGEST_NAME = 44

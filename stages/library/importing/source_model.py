@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.kit.geometry.file_axes import Direction
 from scenewright.stages.kit.geometry.solids import Solid
 from scenewright.stages.kit.geometry.transforms import apply
 
-Direction = tuple[float, float, float]
-JointKind = Literal["fixed", "floating", "revolute", "continuous", "prismatic", "unknown"]
+JointKind = Literal["fixed", "floating", "revolute", "continuous", "prismatic"]
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,10 @@ class Surface:
     """What the file calls it; may say `handle`."""
     solid: Solid | None = None
     """The same as a convex solid, for boxes, cylinders and spheres."""
+    mesh_origin: np.ndarray | None = None
+    """(3,) where the origin of its mesh file lies, None for what a description writes itself."""
+    mesh_unit: float = 1.0
+    """Metres per unit of the mesh file that were applied."""
 
     def moved(self, target_from_source: np.ndarray) -> Surface:
         """Return the surface under a (4, 4) transform, which may scale and mirror."""
@@ -37,7 +41,15 @@ class Surface:
         if solid is not None:
             turned = solid.faces[:, ::-1] if mirrored else solid.faces
             solid = Solid(apply(target_from_source, solid.vertices), turned, solid.curved)
-        return Surface(vertices, faces, self.colors, self.name, solid)
+        origin = None if self.mesh_origin is None else apply(target_from_source, self.mesh_origin[None])[0]
+        return replace(self, vertices=vertices, faces=faces, solid=solid, mesh_origin=origin)
+
+    def in_unit(self, unit: float) -> Surface:
+        """Return the surface as it is when its mesh file is in units of `unit` metres; other shapes stay."""
+        if self.mesh_origin is None:
+            return self
+        vertices = self.mesh_origin + unit / self.mesh_unit * (self.vertices - self.mesh_origin)
+        return replace(self, vertices=vertices, mesh_unit=unit)
 
 
 @dataclass(frozen=True)
@@ -101,6 +113,31 @@ class SourceModel:
     contains: bool | None = None
     """Whether the data set says that things can be put inside."""
     findings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeshContent:
+    """Surfaces of one mesh file, in the file's frame and unit."""
+
+    surfaces: tuple[Surface, ...]
+    unit: Declared
+    up: Declared
+    findings: tuple[str, ...] = ()
+
+    @property
+    def triangles(self) -> int:
+        """How many there are."""
+        return sum(len(surface.faces) for surface in self.surfaces)
+
+
+def held_fast(joint: str, kind: str) -> str:
+    """Return the finding on a joint of a type that no model here has."""
+    return f"joint {joint!r:.40} is of type {kind!r:.20}: held fast"
+
+
+def coupled(joint: str, driver: str) -> str:
+    """Return the finding on a joint that another one drives."""
+    return f"joint {joint!r:.40} follows joint {driver!r:.40} (mimic): here both move freely"
 
 
 PLAIN_COLOR = (178, 178, 178)

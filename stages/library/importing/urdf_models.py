@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.kit.formats.urdf_file import joint_ends
+from scenewright.stages.kit.formats.known_elements import plain_tag, unknown_elements
+from scenewright.stages.kit.formats.urdf_file import COUNTED, KNOWN_URDF, joint_ends
 from scenewright.stages.kit.geometry.solids import Solid, box, cylinder
 from scenewright.stages.kit.geometry.transforms import transform_from
-from scenewright.stages.library.importing.limits import Allowance, few_findings
-from scenewright.stages.library.importing.mesh_reading import read_mesh_file
-from scenewright.stages.library.importing.primitives import ball
+from scenewright.stages.library.importing.description_meshes import Naming, mesh_surfaces
+from scenewright.stages.library.importing.limits import MOST_LINKS, Allowance, few_findings, one_color, refuse_many
+from scenewright.stages.library.importing.primitives import ball, capsule
 from scenewright.stages.library.importing.source_folder import SourceFolder, numbers
 from scenewright.stages.library.importing.source_model import (
     Declared,
@@ -23,7 +23,8 @@ from scenewright.stages.library.importing.source_model import (
     SourceLink,
     SourceModel,
     Surface,
-    painted_faces,
+    coupled,
+    held_fast,
     solid_surface,
 )
 from scipy.spatial.transform import Rotation
@@ -90,16 +91,22 @@ class _Reader:
         self.units: set[float] = set()
         self.allowance = Allowance(str(path))
         self.materials: dict[str, tuple[float, float, float]] = {}
+        self.textured: set[str] = set()
+        """Names of materials with a texture."""
 
     def model(self) -> SourceModel:
         robot = self.folder.read_xml(self.path)
         if robot.tag != "robot":
             raise BadInput(f"{self.path}: root element is <{robot.tag}>, expected <robot>")
         for material in robot.findall("material"):
+            if material.find("texture") is not None:
+                self.textured.add(material.get("name", ""))
             color = material.find("color")
             if color is not None:
                 rgba = numbers(color.get("rgba"), 4, f"{self.path}: rgba")
                 self.materials[material.get("name", "")] = (float(rgba[0]), float(rgba[1]), float(rgba[2]))
+        refuse_many(str(self.path), "links", len(robot.findall("link")), MOST_LINKS)
+        self.findings += unknown_elements([robot], KNOWN_URDF, COUNTED)
         links = tuple(self._link(element) for element in robot.findall("link"))
         joints = tuple(self._joint(element) for element in robot.findall("joint"))
         name = self.path.stem
@@ -141,6 +148,8 @@ class _Reader:
         material = element.find("material")
         if material is None:
             return None
+        if material.find("texture") is not None or material.get("name", "") in self.textured:
+            self.findings.append(one_color("texture of material", material.get("name", "")))
         color = material.find("color")
         if color is None:
             return self.materials.get(material.get("name", ""))
@@ -157,7 +166,8 @@ class _Reader:
             self.allowance.take_counts(len(solid.faces), len(solid.vertices))
             return [solid_surface(solid, color, name).moved(pose)]
         if mesh is None:
-            self.findings.append(f"a shape of link {element.get('name', '')!r:.40} is of no known kind")
+            kinds = ", ".join(f"<{plain_tag(child):.40}>" for child in geometry)
+            self.findings.append(f"a shape of {where.rpartition(': ')[2]} is left out: {kinds or 'it is empty'}")
             return []
         scale = np.diag([*numbers(mesh.get("scale", "1 1 1"), 3, f"{where}: scale"), 1.0])
         file = mesh.get("filename", "")
@@ -169,13 +179,18 @@ class _Reader:
         where = f"{self.path}: joint {name!r:.60}"
         parent, child = joint_ends(element, where)
         axis, limit = element.find("axis"), element.find("limit")
+        kind = KINDS.get(element.get("type", ""))
+        if kind is None:
+            self.findings.append(held_fast(name, element.get("type", "")))
+        if (mimic := element.find("mimic")) is not None:
+            self.findings.append(coupled(name, mimic.get("joint", "")))
         lower, upper = (
             float(numbers("0" if limit is None else limit.get(key, "0"), 1, f"{where}: {key}")[0])
             for key in ("lower", "upper")
         )
         return SourceJoint(
             name=name,
-            kind=KINDS.get(element.get("type", ""), "unknown"),
+            kind=kind or "fixed",
             parent=parent,
             child=child,
             parent_from_child=self._pose(element, where),
@@ -185,57 +200,13 @@ class _Reader:
         )
 
 
-@dataclass(frozen=True)
-class Naming:
-    """The description that names meshes, and what is gathered about them."""
-
-    folder: SourceFolder
-    path: Path
-    findings: list[str]
-    units: set[float]
-    allowance: Allowance
-
-
-def mesh_surfaces(
-    by: Naming, name: str, link_from_mesh: np.ndarray, color: tuple[float, float, float] | None, label: str
-) -> list[Surface]:
-    """Return the surfaces of a mesh file that a description names; `link_from_mesh` (4, 4) may scale.
-
-    A COLLADA file's unit is applied and noted, its up axis is not: simulators read it so. Raises BadInput for a missing
-    file, and for more than the description's allowance.
-    """
-    folder, path = by.folder, by.path
-    file = folder.find(name, path.parent)
-    if file is None:
-        raise BadInput(f"{path}: mesh {name!r:.100} is not in the folder", hint="copy it beside the description")
-    if not file.is_relative_to(path.parent) or ".." in Path(name).parts:
-        by.findings.append("meshes are named elsewhere; files of the same path were found in the folder")
-    content = read_mesh_file(folder, file)
-    unit = 1.0
-    if isinstance(content.unit.value, float) and content.unit.origin == "file":
-        unit = content.unit.value
-        by.units.add(unit)
-    by.findings.extend(content.findings)
-    by.allowance.take(content.surfaces)
-    scaled_pose = link_from_mesh @ np.diag([unit, unit, unit, 1.0])
-    moved = []
-    for surface in content.surfaces:
-        if (
-            color is not None
-            and file.suffix.lower() in (".stl", ".obj")
-            and len(np.unique(surface.colors, axis=0)) == 1
-        ):
-            surface = Surface(surface.vertices, surface.faces, painted_faces(len(surface.faces), color), surface.name)
-        labelled = Surface(
-            surface.vertices, surface.faces, surface.colors, f"{label} {file.stem} {surface.name}".strip()
-        )
-        moved.append(labelled.moved(scaled_pose))
-    return moved
-
-
 def _primitive(geometry: ElementTree.Element, where: str) -> Solid | None:
-    """Return the box, cylinder or sphere of a URDF geometry, None when it is another."""
-    for tag, keys in (("box", ("size",)), ("cylinder", ("radius", "length")), ("sphere", ("radius",))):
+    """Return the box, cylinder, capsule or sphere of a URDF geometry, None when it is another.
+
+    The length of a capsule is that of its cylinder, as urdfdom, Bullet and MuJoCo take it.
+    """
+    round_kinds = {"cylinder": ("radius", "length"), "capsule": ("radius", "length"), "sphere": ("radius",)}
+    for tag, keys in {"box": ("size",), **round_kinds}.items():
         element = geometry.find(tag)
         if element is None:
             continue
@@ -243,10 +214,12 @@ def _primitive(geometry: ElementTree.Element, where: str) -> Solid | None:
             x, y, z = numbers(element.get("size"), 3, f"{where}: box size") / 2
         else:
             values = [float(numbers(element.get(key), 1, f"{where}: {key}")[0]) for key in keys]
-            x, y, z = values[0], values[0], values[-1] / 2 if tag == "cylinder" else values[0]
+            x, y, z = values[0], values[0], values[-1] / 2 if len(keys) == 2 else values[0]
         if not 0 < min(x, y, z) <= max(x, y, z) < 1e6:
             raise BadInput(f"{where}: a {tag} without size")
         if tag == "box":
             return box((-x, x), (-y, y), (-z, z))
+        if tag == "capsule":
+            return capsule(x, z)
         return cylinder(x, (-z, z), count=24) if tag == "cylinder" else ball(np.array([x, y, z]))
     return None

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from scenewright.stages.kit.predicates.evaluating import Evaluator
 from scenewright.stages.kit.predicates.expressions import Predicate, Tree
+from scenewright.stages.kit.predicates.goal_sentences import read_goal
 from scenewright.stages.kit.predicates.vocabulary import Perceived
 from scenewright.stages.kit.tasks.strips import Atom, Domain
 from scenewright.stages.predicates.learning.operators import Transition, learn_operators
@@ -107,6 +109,16 @@ class Memory:
         ]
         apart = self.setting.tells_apart
         return learn_operators(name, used, transitions, atoms, self.preconditions(), apart)
+
+    def wanted(self, sentence: str, objects: Iterable[str]) -> tuple[frozenset[Atom], str]:
+        """Return what a goal in words wants of objects, or nothing and what the words lack."""
+        reading = read_goal(sentence, objects, self.goals)
+        if reading.lacking:
+            return frozenset(), reading.lacking
+        for part in reading.parts:
+            if not self.goal_atoms([part])[0]:
+                return frozenset(), f"nobody has said what {part[0]!r} means"
+        return self.goal_atoms(list(reading.parts))[0], ""
 
     def goal_atoms(self, parts: list[tuple[str, tuple[str, ...]]]) -> tuple[frozenset[Atom], tuple[str, ...]]:
         """Return what a goal sentence's parts want, and the parts that nobody has explained."""

@@ -77,7 +77,7 @@ def _task(room: RoomState, number: int, random: np.random.Generator) -> RoomTask
         goal = _walk_goal(state, random)
         if goal:
             objects = {name: body.middle[:2] for name, body in state.bodies.items()}
-            return RoomTask(f"{ROOM}/{number + 1}", objects, goal, int(random.integers(2**31)), state)
+            return RoomTask(f"{ROOM}/{number + 1}", objects, goal, int(random.integers(2**31)), room=state)
     raise BadInput("no goal was found for this room", hint="a room with more things in it")
 
 

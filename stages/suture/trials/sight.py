@@ -82,7 +82,7 @@ class LookingEyes:
         self.looked: list[Looked] = []
         self._estimate = ESTIMATORS[model.name].of_view
         self._world = make_scene(seed, TWO_CAMERAS, calibration_error=CALIBRATION_ERROR)
-        self._segmenter: Any = open_segmenter(None) if pictures else None
+        self._segmenter: Any = open_segmenter(None, "--sight geometry needs none") if pictures else None
         self._bench: Bench | None = None
         self._state = b""
         self._view: StereoView | None = None

@@ -76,7 +76,7 @@ def table_plane(
     if len(points) < 500:
         raise BadInput(
             f"{len(points)} pixels have a depth between {NEAREST} and {FARTHEST} m",
-            hint="check the depth image and its scale (--depth-scale)",
+            hint="check the depth image and its scale: --depth-scale is metres a unit",
         )
     random = np.random.default_rng([seed, 73])
     points = points[random.permutation(len(points))[:POINTS]]

@@ -116,7 +116,7 @@ def see(
     if middle > MILLIMETRES:
         raise BadInput(
             f"the median depth is {middle:.4g}: that is no table in metres",
-            hint="depth must be in metres: give the file's scale (--depth-scale 0.001 for mm)",
+            hint="give the file's scale: --depth-scale 0.001 where it is in mm",
         )
     pose = None if isinstance(camera, Camera) else np.asarray(camera.world_from_camera, dtype=float)
     if pose is not None and _is_usual(intrinsics, pose):

@@ -16,6 +16,7 @@ from scenewright.cli.main import run
 from scenewright.schemas.cutting_demonstrations import CuttingDemonstrationsFile, CuttingRecording
 from scenewright.schemas.cutting_model import CuttingModelFile
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.cutting.ours.grammar import learn
 from scenewright.stages.cutting.recording.panels import HEIGHT, WIDTH, NoCut
 from scenewright.stages.cutting.recording.server import RecordingServer
 from scenewright.stages.cutting.recording.session import Session, object_of, read_recording
@@ -51,6 +52,13 @@ def test_two_clicks_are_the_plane_of_their_line_and_the_line_of_sight(tmp_path: 
         piece, plane = session.shown.plane(across(MIDDLE - 0.5, panel))
         assert piece == 0 and abs(plane.normal[axis]) > 0.999 and abs(plane.normal[flat]) < 0.01
         assert abs(plane.height(0.5 * (low + high)[None])[0]) < 2e-3 * (high - low).max()
+
+
+def test_too_few_pieces_to_learn_from_are_counted(tmp_path: Path) -> None:
+    session = Session(tmp_path / "cuts.json", "carrot", 5)
+    session.cut(across(MIDDLE))
+    with pytest.raises(ValueError, match="3 pieces, whole ones too; at least 4"):
+        learn([session.trial], seed=0)
 
 
 def test_every_cut_is_kept_at_once_and_a_recording_is_gone_on_with(tmp_path: Path) -> None:

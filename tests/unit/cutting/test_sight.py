@@ -76,10 +76,10 @@ def test_what_is_seen_is_enough_to_make_the_goal(learned: Learned) -> None:
 
 def test_one_stroke_through_several_pieces_saves_strokes(learned: Learned) -> None:
     objects = [make_food("bread", np.random.default_rng(0))]
-    items, _ = imagine(objects, [(12, "cubes")], learned.grammar)
+    wish = imagine(objects, [(12, "cubes")], learned.grammar)
     strokes = []
     for together in (False, True):
-        carving = carry_out(learned.policy_for(items, together=together), objects, most=13)
+        carving = carry_out(learned.policy_for(wish, together=together), objects, most=13)
         assert len(carving.board) == 12 and len(carving.steps) == 11
         strokes.append(carving.strokes)
     assert strokes[0] == 11 > strokes[1]

@@ -21,6 +21,7 @@ from scenewright.stages.report.sections.stereo.view import stereo_view
 from tests.unit.disparity.pairs import BASELINE, CAMERA, pair, write_folder
 from tests.unit.disparity.running import matched
 from tests.unit.disparity.test_rectification import turned
+from tests.unit.ingest.message_logs import FIRST, recorder
 from tests.unit.ingest.running import ingest
 
 LEFT, RIGHT, TRUTH, SEEN = pair()
@@ -87,9 +88,36 @@ def test_swapped_pictures_are_said_to_be_swapped(tmp_path: Path) -> None:
         matched(sequence, tmp_path / "disparity")
 
 
-def test_a_calibration_that_is_swapped_or_without_a_baseline_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="swapped"):
-        ingest(write_folder(tmp_path / "swapped", [(LEFT, RIGHT)], baseline=-BASELINE), tmp_path / "a")
+def test_a_calibration_with_the_wrong_sign_is_told_by_its_pictures(tmp_path: Path) -> None:
+    sequence = ingest(write_folder(tmp_path / "log", [(LEFT, RIGHT)], baseline=-BASELINE), tmp_path / "sequence")
+    assert sequence.info.cameras[0].baseline == pytest.approx(BASELINE)
+    assert any("sign of the calibration is taken to be wrong" in note for note in sequence.info.notes)
+    made = matched(sequence, tmp_path / "disparity")
+    assert made.outcome == "ok"
+    with FrameReader(made.path("frames.mcap")) as reader:
+        depth = reader.read(0).depth
+    known = (depth > 0) & SEEN
+    assert np.median(np.abs(depth - CAMERA.fx * BASELINE / TRUTH)[known]) < 0.04
+
+
+def test_pictures_and_calibration_that_are_both_exchanged_are_refused_and_the_advice_works(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="left and right are swapped.*further right") as error:
+        ingest(write_folder(tmp_path / "log", [(RIGHT, LEFT)], baseline=-BASELINE), tmp_path / "a")
+    assert error.value.hint == "exchange the pictures of left and right"
+    exchanged = write_folder(tmp_path / "exchanged", [(LEFT, RIGHT)], baseline=-BASELINE)
+    assert ingest(exchanged, tmp_path / "b").info.cameras[0].baseline == pytest.approx(BASELINE)
+
+
+def test_pictures_that_do_not_tell_leave_it_to_the_options(tmp_path: Path) -> None:
+    plain = np.full_like(LEFT, 90)
+    log = write_folder(tmp_path / "log", [(plain, plain)], baseline=-BASELINE)
+    with pytest.raises(BadInput, match="the pictures do not tell") as error:
+        ingest(log, tmp_path / "a")
+    assert "--baseline 0.1" in str(error.value.hint)
+    assert ingest(log, tmp_path / "b", baseline=0.1).info.cameras[0].baseline == 0.1
+
+
+def test_a_calibration_without_a_baseline_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no baseline"):
         ingest(write_folder(tmp_path / "zero", [(LEFT, RIGHT)], baseline=0.0), tmp_path / "b")
 
@@ -194,3 +222,23 @@ def test_inspect_offers_the_step() -> None:
     rows = {row.step: row for row in step_reports({"usable frames", "a stereo pair with a baseline", "colour"})}
     assert rows["disparity"].ready
     assert rows["segment"].missing == ("depth (make it with `disparity`)",)
+
+
+@pytest.mark.parametrize("wrong", ["sign of the calibration", "pictures"])
+def test_ingest_and_disparity_do_not_send_each_other_in_a_circle(tmp_path: Path, wrong: str) -> None:
+    sign, pictures = (-1, (LEFT, RIGHT)) if wrong == "sign of the calibration" else (1, (RIGHT, LEFT))
+    with recorder(tmp_path) as log:
+        for name, picture, x in zip(("left", "right"), pictures, (0.0, sign * BASELINE), strict=True):
+            shift = -CAMERA.fx * x
+            projection = [CAMERA.fx, 0, CAMERA.cx, shift, 0, CAMERA.fy, CAMERA.cy, 0, 0, 0, 1.0, 0]
+            log.info(f"/{name}/camera_info", FIRST, "eyes", CAMERA, P=projection)
+            log.image(f"/{name}/image_rect", FIRST, picture, "rgb8", "eyes")
+    sequence = ingest(log.path, tmp_path / "sequence")
+    if wrong == "pictures":
+        with pytest.raises(BadInput, match="further right") as error:
+            matched(sequence, tmp_path / "refused")
+        assert "--color-topic and --right-topic" in str(error.value.hint)
+        topics = {"color_topic": "/right/image_rect", "right_topic": "/left/image_rect"}
+        sequence = ingest(log.path, tmp_path / "exchanged", **topics)
+    assert sequence.info.cameras[0].baseline == pytest.approx(BASELINE)
+    assert matched(sequence, tmp_path / "disparity").outcome == "ok"

@@ -133,8 +133,8 @@ def context(out: Path) -> Context:
     return Context(output=out, seed=0, device="cpu", progress=SilentProgress())
 
 
-def made(scan: Path, out: Path, **more: Path) -> PanopticMap:
-    return run(from_mesh=scan, parameters=FuseParameters(), context=context(out), **more)
+def made(scan: Path, out: Path, labels: Path | None = None, **options: str) -> PanopticMap:
+    return run(from_mesh=scan, labels=labels, parameters=FuseParameters(**options), context=context(out))
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
@@ -295,3 +295,85 @@ def test_a_real_scan(tmp_path: Path) -> None:
     for entity in made(scan, tmp_path / "map").info.entities:
         counts[entity.class_name] = counts.get(entity.class_name, 0) + 1
     assert counts["chair"] == 5 and counts["table"] == 1 and counts["floor"] == counts["wall"] == 1
+
+
+Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+"""Turns z to y."""
+
+
+def same_room(panoptic_map: PanopticMap) -> None:
+    """What is found in `room` as it stands: floor, walls, and the table with the box on it."""
+    found = {entity.class_name: entity for entity in panoptic_map.info.entities}
+    assert {"floor", "wall", "object"} <= set(found)
+    assert found["floor"].box_maximum[2] - found["floor"].box_minimum[2] < 0.1
+    assert np.ptp([found["floor"].box_minimum[0], found["floor"].box_maximum[0]]) > 2
+    table = max((e for e in panoptic_map.info.entities if e.class_name == "object"), key=lambda e: e.vertices)
+    assert 0.7 < table.box_maximum[2] < 1.0
+
+
+@pytest.mark.parametrize(("up", "turn"), [("+y", Y_UP), ("-z", np.diag([1.0, -1, -1])), ("+z", np.eye(3))])
+@pytest.mark.parametrize(("unit", "a_metre"), [("mm", 1000.0), ("cm", 100.0), ("inch", 1 / 0.0254), ("m", 1.0)])
+def test_a_scan_is_turned_and_scaled_as_the_options_say(
+    tmp_path: Path, up: str, turn: np.ndarray, unit: str, a_metre: float
+) -> None:
+    mesh, _ = room(up=turn)
+    mesh.vertices = mesh.vertices * a_metre
+    write_ply(tmp_path / "scan.ply", mesh)
+    same_room(made(tmp_path, tmp_path / "out", up=up, unit=unit))
+
+
+@pytest.mark.parametrize(("unit", "a_metre"), [("mm", 1000.0), ("cm", 100.0)])
+def test_a_scan_of_kilometres_is_refused_with_the_unit_that_makes_it_a_room(
+    tmp_path: Path, unit: str, a_metre: float
+) -> None:
+    mesh, labels = room()
+    mesh.vertices = mesh.vertices * a_metre
+    for name, columns in (("bare", {}), ("labelled", {"label": labels})):
+        write_ply(tmp_path / f"{name}.ply", mesh, **columns)
+        with pytest.raises(BadInput, match="which is no room") as error:
+            made(tmp_path / f"{name}.ply", tmp_path / name)
+        assert f"--unit {unit} makes it 2.4" in error.value.hint.replace("3 x 2.4", "2.4")
+    same_room(made(tmp_path / "bare.ply", tmp_path / "out", unit=unit))
+
+
+def test_a_scan_that_lies_on_its_side_is_spoken_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    write_ply(tmp_path / "scan.ply", room(up=Y_UP)[0])
+    made(tmp_path, tmp_path / "out")
+    assert "if y is up: --up +y makes it 1.5 m high" in caplog.text
+
+
+@pytest.mark.parametrize("name", ["scan.obj", "scan.stl", "scan.glb", "cloud.ply"])
+def test_a_bare_scan_of_any_format(tmp_path: Path, name: str) -> None:
+    mesh, _ = room()
+    if name == "scan.glb":  # y is up in glTF
+        mesh.vertices = mesh.vertices @ Y_UP.T
+    if name == "cloud.ply":
+        points = trimesh.sample.sample_surface(mesh, 30000, seed=0)[0]
+        (tmp_path / name).write_bytes(trimesh.PointCloud(points).export(file_type="ply"))
+    else:
+        mesh.export(tmp_path / name)
+    same_room(made(tmp_path / name, tmp_path / "out"))
+
+
+def test_labelled_points_without_faces_are_sent_to_the_form_that_says_which_are_one_thing(tmp_path: Path) -> None:
+    mesh, labels = room()
+    points = trimesh.Trimesh(mesh.vertices, np.zeros((0, 3), int), process=False)
+    write_ply(tmp_path / "cloud.ply", points, label=labels)
+    with pytest.raises(BadInput, match="points with labels and without faces") as error:
+        made(tmp_path / "cloud.ply", tmp_path / "out")
+    assert "NPZ" in error.value.hint
+
+
+def test_several_bare_scans_are_asked_to_be_named(tmp_path: Path) -> None:
+    for name in ("a.obj", "b.obj"):
+        (tmp_path / name).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(BadInput, match="2 meshes without labels, a.obj, b.obj"):
+        made(tmp_path, tmp_path / "out")
+
+
+def test_unit_and_up_are_of_scans_alone() -> None:
+    frames = {"sequence": Path("s"), "segments": Path("t")}
+    for options in ({"unit": "mm"}, {"up": "+y"}):
+        with pytest.raises(UsageError, match="are those of --from-mesh"):
+            check(FuseParameters(**options), frames)
+        check(FuseParameters(**options), {"from_mesh": Path("m")})

@@ -10,7 +10,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.geometry.transforms import inverse, quaternion_of
 
-from tests.unit.ingest.tiny_room import CAMERA, jpeg, millimetres, png
+from tests.unit.ingest.tiny_room import CAMERA, frames, jpeg, millimetres, png
 
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 FIRST_STAMP = 1305031102.175304
@@ -46,6 +46,23 @@ def write_tum(root: Path, recorded: list, *, depth_shift: float = 0.004, groundt
         (root / name).write_text("\n".join(lines) + "\n")
     k = CAMERA
     (root / "calibration.txt").write_text(f"{k.fx} {k.fy} {k.cx} {k.cy}\n")
+    return root
+
+
+def write_numbered_tum(root: Path, stamps: list[float], *, pairs: bool, units: float = 5000.0) -> Path:
+    """Write a TUM folder without poses whose pictures are numbered and have these stamps."""
+    lists: dict[str, list[str]] = {"rgb": [], "depth": []}
+    for name in lists:
+        (root / name).mkdir(parents=True)
+    for index, (color, depth, _) in enumerate(frames(len(stamps))):
+        for name, image in (("rgb", color), ("depth", np.rint(depth * units).astype(np.uint16))):
+            (root / name / f"{name}{index:05d}.png").write_bytes(png(image))
+            lists[name].append(f"{stamps[index]:.9f} {name}/{name}{index:05d}.png")
+    if pairs:
+        lists = {"associations": [" ".join(row) for row in zip(lists["rgb"], lists["depth"], strict=True)]}
+    for name, rows in lists.items():
+        (root / f"{name}.txt").write_text("\n".join(rows) + "\n")
+    (root / "calibration.txt").write_text(f"{CAMERA.fx} {CAMERA.fy} {CAMERA.cx} {CAMERA.cy}\n")
     return root
 
 

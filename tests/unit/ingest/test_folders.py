@@ -96,6 +96,8 @@ def test_missing_intrinsics_are_asked_for_not_guessed(tmp_path: Path) -> None:
     (write_redwood(tmp_path / "redwood", recorded) / "camera_intrinsic.json").unlink()
     with pytest.raises(BadInput, match="96x72"):
         ingest(tmp_path / "redwood", tmp_path / "c")
+    for name in ("posed", "scenes", "redwood"):
+        assert ingest(tmp_path / name, tmp_path / f"{name}_given", **INTRINSICS).info.camera == CAMERA
 
 
 def test_selection_and_its_count(tmp_path: Path) -> None:
@@ -176,7 +178,7 @@ def test_no_usable_frame_is_an_empty_sequence_with_a_reason(tmp_path: Path) -> N
         path.write_bytes(png(np.zeros((72, 96), np.uint16)))
     sequence = ingest(log, tmp_path / "out")
     assert sequence.outcome == "empty"
-    assert sequence.summary["reason"] == "no usable frame: no_valid_depth 3"
+    assert sequence.summary["reason"] == "no usable frame: no_valid_depth 3 (is the depth unit right (--depth-scale)?)"
     assert sequence.info.frame_count == 0 and sequence.info.drops == {"no_valid_depth": 3}
     with FrameReader(sequence.path("frames.mcap")) as reader:
         assert len(reader) == 0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.cameras import back_project
-from scenewright.stages.kit.geometry.gravity import find_floor, mean_camera_up, upright_from_direction, wall_yaw
+from scenewright.stages.kit.geometry.gravity import camera_up, find_floor, upright_from_direction, wall_yaw
 from scenewright.stages.kit.geometry.surface_samples import surface_samples
 from scenewright.stages.kit.geometry.transforms import apply, look_at, rotation_between, transform_from
 from scenewright.stages.kit.geometry.upright_world import make_upright
@@ -94,7 +94,7 @@ def test_given_axis_becomes_z(axis: str) -> None:
 def test_cameras_that_look_everywhere_have_no_mean_up() -> None:
     down = look_at(np.zeros(3), np.array([1.0, 0, 0]))
     flipped = look_at(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 0, -1.0]))
-    assert mean_camera_up(np.array([down, flipped])) is None
+    assert camera_up(np.array([down, flipped])) is None
     gravity = make_upright("auto", "z", None, np.array([down, flipped]), lambda: pytest.fail("not looked at"), None)
     assert gravity.method == "none"
 

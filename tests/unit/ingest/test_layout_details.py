@@ -16,6 +16,7 @@ from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.kit.geometry.transforms import transform_from, transform_from_yaw
 from scipy.spatial.transform import Rotation
 
+from tests.unit.ingest.calibrations import CAMODOCAL, ORB_SLAM
 from tests.unit.ingest.depth_array_writing import write_colmap_array
 from tests.unit.ingest.folder_writers import (
     FIRST_STAMP,
@@ -526,6 +527,12 @@ def test_stamped_names_and_trajectory(tmp_path: Path) -> None:
         ),
         ("sensor.yaml", "intrinsics: [80, 80, 47.5, 35.5]\nresolution: [96, 72]\ndistortion_model: radtan\n"),
         ("calib.txt", "P0: 80 0 47.5 0 0 80 35.5 0 0 0 1 0\n"),
+        ("camera.json", '{"K": [80, 0, 0, 0, 80, 0, 47.5, 35.5, 1]}'),
+        ("TUM1.yaml", ORB_SLAM),
+        ("EuRoC.yaml", ORB_SLAM.replace("Camera.", "Camera1.").replace("Camera1.type", "Camera.type")),
+        ("cam0_pinhole.yaml", CAMODOCAL),
+        ("front.json", '{"fx": 80, "fy": 80, "cx": 47.5, "cy": 35.5}'),
+        ("lens.txt", "fx: 80\nfy: 80\ncx: 47.5\ncy: 35.5\n"),
     ],
 )
 def test_calibration_files(tmp_path: Path, name: str, text: str) -> None:

@@ -160,6 +160,20 @@ def test_side_by_side_pictures(tmp_path: Path, unit: float) -> None:
     assert "side by side" in notes and ("taken as millimetres" in notes) == (unit == 1000)
 
 
+@pytest.mark.parametrize(("unit", "metres"), [(1.0, 0.06), (1000.0, 0.06), (100.0, None), (50.0, 0.003)])
+def test_a_baseline_in_a_unit_that_is_not_clear_is_asked_for(tmp_path: Path, unit: float, metres: float | None) -> None:
+    apart = transform_from(np.eye(3), np.array([0.06, 0, 0]))
+    log = write_pair(tmp_path / "log", spots(LEFT, POINTS), spots(LEFT, in_right(POINTS, apart)))
+    _opencv_file(log / "calibration.yaml", LEFT, LEFT, apart, unit, 0, 0, 0, 0)
+    if metres is None:
+        with pytest.raises(BadInput, match="stand 6 apart, too far for metres") as error:
+            open_log(log, IngestParameters())
+        assert "--baseline 0.06 if it is in centimetres, --baseline 0.006 if in millimetres" in str(error.value.hint)
+    else:
+        assert open_log(log, IngestParameters()).cameras[0].baseline == pytest.approx(metres)
+    assert open_log(log, IngestParameters(baseline=0.06)).cameras[0].baseline == 0.06
+
+
 def test_left_and_right_files_of_one_camera_each(tmp_path: Path) -> None:
     log = write_pair(tmp_path / "log", spots(LEFT, POINTS), spots(LEFT, in_right(POINTS, STRAIGHT)))
     for name, shift in (("left", 0.0), ("right", -LEFT.fx * BASELINE)):
@@ -190,7 +204,7 @@ def test_pairs_that_are_none(tmp_path: Path) -> None:
         open_log(log, IngestParameters())
     (log / "intrinsics.txt").unlink()
     _opencv_file(log / "calibration.yaml", LEFT, LEFT, inverse(STRAIGHT), 1.0, 0, 0, 0, 0)
-    with pytest.raises(BadInput, match="left and right are swapped"):
+    with pytest.raises(BadInput, match="seem to be swapped.*do not tell"):
         open_log(log, IngestParameters())
     _opencv_file(log / "calibration.yaml", LEFT, LEFT, np.eye(4), 1.0, 0, 0, 0, 0)
     with pytest.raises(BadInput, match="no baseline"):

@@ -288,7 +288,7 @@ def test_swapped_eyes_are_refused_by_name(tmp_path: Path) -> None:
     with recorder(tmp_path) as log:
         _stereo_log(log, 0.1, ("right", "left"))
     with pytest.raises(
-        BadInput, match=r"swapped: /stereo/right/\S+ stands 0.1 m to the left of /stereo/left.*--color-topic"
+        BadInput, match=r"swapped: by the calibration /stereo/right/\S+ stands 0.1 m to the left of /stereo/left"
     ):
         ingest(log.path, tmp_path / "out")
     fixed = {"color_topic": "/stereo/right/image_rect/compressed", "right_topic": "/stereo/left/image_rect/compressed"}
@@ -306,8 +306,7 @@ def test_eyes_without_a_baseline_are_two_cameras_and_no_pair(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("offset", "complaint"),
-    [([0.0, 0, 0], "no baseline"), ([-0.1, 0, 0], "swapped"), ([0.0, 0.1, 0], "one above the other")],
+    ("offset", "complaint"), [([0.0, 0, 0], "no baseline"), ([0.0, 0.1, 0], "one above the other")]
 )
 def test_transforms_that_make_no_pair(offset: list[float], complaint: str) -> None:
     record = _record(CAMERA, "plumb_bob", (), P=())

@@ -10,9 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.preflight.inspection import inspect_log
 from scenewright.stages.ingest.transform_tree import SAME, Track, TransformTree, interpolated
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.transforms import inverse, transform_from, transform_from_yaw
+from scenewright.stages.kit.progress import SilentProgress
 from scipy.spatial.transform import Rotation
 
 from tests.unit.ingest.message_logs import FIRST, SECOND, recorder
@@ -75,7 +78,9 @@ def test_gap_in_the_transforms_costs_the_frames_within_it(tmp_path: Path) -> Non
         _images(log, 20)
     info = ingest(log.path, tmp_path / "out", gravity="none").info
     assert info.drops == {"missing_pose": 10} and info.frame_count == 10
-    assert any("10 of 20 frames have no pose" in note and "2.1 s apart there" in note for note in info.notes)
+    (note,) = (note for note in info.notes if "10 of 20 frames have no pose" in note)
+    assert "2.1 s apart there (--maximum-transform-gap 2.1 interpolates)" in note
+    assert ingest(log.path, tmp_path / "advised", gravity="none", maximum_transform_gap=2.1).info.drops == {}
 
 
 def test_static_transforms_alone_are_no_poses(tmp_path: Path) -> None:
@@ -244,3 +249,31 @@ def test_the_parent_that_leads_to_the_wanted_world_counts() -> None:
     assert tree.chain("base") == ["base", "odom", "map"] and tree.is_preferred("base")
     np.testing.assert_allclose(tree.lookup("map", "base", 5, gap=ANYWHERE, tolerance=ANYWHERE), second)
     np.testing.assert_allclose(tree.lookup("base", "map", 5, gap=1, tolerance=ANYWHERE), inverse(second), atol=1e-12)
+
+
+def test_missing_static_transforms_are_named_with_the_frames_that_the_log_knows(tmp_path: Path) -> None:
+    with recorder(tmp_path) as log:
+        for tick in range(10):
+            log.transform("/tf", FIRST + tick * SECOND // 10, "map", "base_link", _moved(tick / 10))
+        _images(log)
+    info = ingest(log.path, tmp_path / "out").info
+    (note,) = (note for note in info.notes if note.startswith("frames have no poses: "))
+    assert "no transforms lead to the camera frame 'optical'" in note and "'base_link', 'map'" in note
+    assert "/tf_static is not among its topics" in note
+    inspected = inspect_log(log.path, IngestParameters(), 4, SilentProgress()).report
+    (finding,) = (finding for finding in inspected.findings if finding.check == "poses")
+    assert "'base_link', 'map'" in finding.message and "/tf_static" in finding.message
+
+
+def test_depth_that_is_a_jpeg_is_named_with_the_reason(tmp_path: Path) -> None:
+    topic = "/cam/depth/image_raw/compressed"
+    with recorder(tmp_path) as log:
+        _images(log)
+        for index in range(4):
+            picture = np.full((30, 40, 3), 60, np.uint8)
+            log.compressed(topic, FIRST + index * SECOND // 5, jpeg(picture), "16UC1; jpeg compressed ", "optical")
+    info = ingest(log.path, tmp_path / "out").info
+    (note,) = (note for note in info.notes if note.startswith("frames have no depth: "))
+    assert f"{topic}: " in note and "JPEG" in note
+    with pytest.raises(BadInput, match="no depth images on topic .*JPEG"):
+        ingest(log.path, tmp_path / "asked", depth_topic=topic)

@@ -22,13 +22,15 @@ from scenewright.stages.kit.formats.cad_models import (
     read_model,
 )
 from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.geometry.file_axes import AXES
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.library.addition import run
 from scenewright.stages.library.importing.classes import class_of
 from scenewright.stages.library.importing.collada_file import parse_collada
-from scenewright.stages.library.importing.frames import AXES, model_rotation
+from scenewright.stages.library.importing.discovery import Unread, find_models
+from scenewright.stages.library.importing.frames import model_rotation
 from scenewright.stages.library.importing.pieces import convex_pieces
 from scenewright.stages.library.importing.placing import normal_limits
 from scenewright.stages.library.importing.source_folder import SourceFolder
@@ -141,15 +143,30 @@ def _cylinder() -> float:
     return 12 * 0.2**2 * np.sin(angle) * 0.3
 
 
-def test_scaling_moves_slides_and_origins_but_no_angles(tmp_path) -> None:
+def test_a_unit_is_that_of_the_mesh_files_of_a_description(tmp_path) -> None:
     urdf_cabinet(tmp_path / "in")
     metres, _ = only(add(tmp_path / "in", tmp_path / "a"))
     tenth, record = only(add(tmp_path / "in", tmp_path / "b", unit="dm"))
-    assert record.unit_from == "option" and any("unusual" in finding for finding in record.findings)
-    for before, after in zip(metres.joints, tenth.joints, strict=True):
-        np.testing.assert_allclose(np.asarray(after.origin), 0.1 * np.asarray(before.origin), atol=1e-6)
-        length = 0.1 if before.type == "prismatic" else 1.0
-        assert after.upper == pytest.approx(length * before.upper)
+    assert (record.unit, record.unit_from) == (0.1, "option")
+    hinges = [joint.origin[2] for joint in (*metres.joints, *tenth.joints) if joint.type == "revolute"]
+    assert [joint.upper for joint in tenth.joints] == [joint.upper for joint in metres.joints]
+    # the carcass is 0.08 high about 0.4 now, and the hinge still 0.2 above the carcass frame
+    bottom = 0.2 - 0.15  # of the door, which is a box of 0.3 in metres
+    assert hinges == [pytest.approx(0.2), pytest.approx(0.2 - bottom)]
+
+
+def test_a_description_without_meshes_is_in_the_unit_that_is_said(tmp_path) -> None:
+    folder = tmp_path / "in"
+    body = '<link name="a"><visual><geometry><box size="400 300 600"/></geometry></visual></link>'
+    door = '<link name="b"><visual><origin xyz="200 0 0"/><geometry><box size="400 20 600"/></geometry></visual></link>'
+    hinge = (
+        '<joint name="j" type="{}"><origin xyz="-200 -160 0"/><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+    )
+    text = f'<robot>{body}{door}{hinge}<limit lower="0" upper="100"/></joint></robot>'
+    write(folder / "cabinet.urdf", text.format("prismatic"))
+    model, record = only(add(folder, tmp_path / "out", unit="mm"))
+    np.testing.assert_allclose(size_of(model), [0.4, 0.32, 0.6], atol=1e-6)
+    assert model.joints[0].upper == pytest.approx(0.1) and (record.unit, record.unit_from) == (0.001, "option")
 
 
 MJCF = """<mujoco model="hutch"><compiler angle="{angle}" eulerseq="xyz"/><include file="../renamed/sub/assets.xml"/>
@@ -499,6 +516,15 @@ def test_real_mjcf_furniture_keeps_its_joints(tmp_path) -> None:
     left, right = by_id["hingecabinet"].joints
     np.testing.assert_allclose([left.axis, right.axis], [[0, 0, -1], [0, 0, 1]], atol=1e-9)
     np.testing.assert_allclose(np.subtract(right.origin, left.origin), [0.76, 0, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "models", "coupled"), [("furniture_mjcf", 41, 11), ("aws_furniture", 18, 0)])
+def test_real_furniture_holds_nothing_unknown(name, models, coupled) -> None:
+    found = list(find_models(SourceFolder(real_data(name))))
+    assert len(found) == models and not any(isinstance(model, Unread) for model in found)
+    told = ("named elsewhere", "texture of material")
+    findings = [finding for model in found for finding in model.findings if not any(word in finding for word in told)]
+    assert len(findings) == coupled and all("of <equality> (joint) left out" in finding for finding in findings)
 
 
 def test_real_dae_furniture_is_in_centimetres(tmp_path) -> None:

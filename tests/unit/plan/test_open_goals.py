@@ -61,6 +61,12 @@ def test_what_the_scene_has_not_is_said(language: LanguageMap) -> None:
         named_goal(('on("red",cup_9)',), {"cup_9": "item"}, other, language)
 
 
+def test_a_word_that_was_never_read_is_unknown(language: LanguageMap, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(open_goals, "LEAST_PROBABILITY", 0.6)
+    with pytest.raises(UsageError, match="whether the scene has 'red guitar' is unknown, .* never read 'guitar': cup_"):
+        named_goal(('on("red guitar",table_3)',), OBJECTS, graph(), language)
+
+
 def test_a_class_that_the_scene_names_is_taken_at_its_word(
     language: LanguageMap, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -72,5 +78,5 @@ def test_a_class_that_the_scene_names_is_taken_at_its_word(
     )
     named = named_goal(('on("cup","coffee table")',), OBJECTS, ContactGraphFile(nodes=nodes, links=()), language)
     assert named[0].endswith(",table_3)") and named[0].startswith("on(cup_")
-    with pytest.raises(UsageError, match="the scene has no 'purple cup': cup_"):
+    with pytest.raises(UsageError, match="'purple cup' is unknown, .* never read 'purple', 'cup': cup_"):
         named_goal(('on("purple cup","coffee table")',), OBJECTS, ContactGraphFile(nodes=nodes, links=()), language)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,15 +10,18 @@ import pytest
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import FrameEstimate, LoopClosure, PosesFile, Trajectory
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
 from scenewright.stages.kit.formats.trajectories import read_tum
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.measurement.pose_error import trajectory_error
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
+from scenewright.stages.poses.contradiction import contradicted
+from scenewright.stages.poses.frame_poses import FramePose
 from scenewright.stages.poses.parameters import PosesParameters, check
 from scenewright.stages.poses.stage import outcome_of, ranges, run
 
-from tests.unit.poses.textured_room import round_walk, write_sequence
+from tests.unit.poses.textured_room import CAMERA, round_walk, write_sequence
 
 FRAMES = 49
 WALK = round_walk(FRAMES)
@@ -135,10 +139,10 @@ def test_all_frames_blank(tmp_path: Path) -> None:
     ("count", "settings", "options", "words"),
     [
         (3, {"with_depth": False}, {}, "no depth"),
-        (1, {}, {}, "one frame has no path"),
+        (1, {}, {}, "has 1 frame, a path needs two"),
         (0, {}, {}, "no frames"),
-        (3, {"with_color": False}, {"method": "sfm"}, "needs colour"),
-        (3, {"with_color": False}, {"bundle_adjustment": True}, "needs colour"),
+        (3, {"with_color": False}, {"method": "sfm"}, "have no colour"),
+        (3, {"with_color": False}, {"bundle_adjustment": True}, "have no colour"),
         (3, {}, {"world": "sequence"}, "has a pose in the sequence"),
     ],
 )
@@ -190,3 +194,37 @@ def test_a_path_that_denies_the_places_it_comes_back_to_is_not_ok() -> None:
 
     assert outcome_of(path(34, 4)) == "ok" and outcome_of(path(28, 30)) == "contradictory"
     assert outcome_of(path(1, 1)) == "ok", "of two places one may look like another"
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.2])
+@pytest.mark.parametrize("wrong", [(), (4,), (3, 4, 11)])
+def test_frames_that_the_depth_of_others_contradicts(tmp_path: Path, wrong: tuple[int, ...], scale: float) -> None:
+    """Also where the unit of the depth is wrong, and every length with it."""
+    sequence = write_sequence(tmp_path / "sequence", WALK[:16])
+    placed = WALK[:16].copy()
+    placed[list(wrong), :3, 3] += (0.4, 0.3, 0.2)
+    placed[:, :3, 3] *= scale
+    path = [FramePose(k, pose, "key" if k % 2 else "tracked") for k, pose in enumerate(placed)]
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        assert contradicted(Rescaled(reader, scale), CAMERA, path, 0.75, 4.5) == set(wrong)  # type: ignore[arg-type]
+
+
+class Rescaled:
+    """A reader of frames whose depth is multiplied."""
+
+    def __init__(self, reader: FrameReader, scale: float) -> None:
+        self.reader, self.scale = reader, scale
+
+    def read(self, index: int, streams: tuple[str, ...]) -> Frame:
+        frame = self.reader.read(index, streams)
+        assert frame.depth is not None
+        return replace(frame, depth=frame.depth * np.float32(self.scale))
+
+
+def test_one_wrong_frame_has_no_pose_and_many_are_contradictory() -> None:
+    def outcome(wrong: int) -> str:
+        good = FrameEstimate(frame=0, time=0.0, status="tracked")
+        bad = FrameEstimate(frame=1, time=0.0, status="unposed", fault="contradicted")
+        return outcome_of(PosesFile.model_construct(frames=(*[good] * (20 - wrong), *[bad] * wrong), loops=()))
+
+    assert [outcome(wrong) for wrong in (0, 1, 3, 4)] == ["ok", "tracking_lost", "tracking_lost", "contradictory"]

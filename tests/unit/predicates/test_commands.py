@@ -34,10 +34,36 @@ def test_a_tower_is_built_and_what_is_missing_is_said(learned: Path, tmp_path: P
 
 def test_what_was_learned_is_counted(learned: Path, tmp_path: Path) -> None:
     out = tmp_path / "evaluation"
-    assert run("evaluate", "--learned", str(learned), "--tasks", "1", "--states", "20", "--out", str(out)) == 0
+    assert run("evaluate", "--learned", str(learned), "--each", "1", "--states", "20", "--out", str(out)) == 0
     results = json.loads((out / "results.json").read_text())
     assert [row["ceiling"] for row in results["rows"]] == [1, 1, 1, 1]
     assert min(results["accuracy"].values()) > 0.9
+
+
+def test_tasks_of_ones_own_are_tried_and_their_sentences_read(
+    learned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    objects = {"shelf": [-5, 0], "coaster": [10, 0], "fruitcan": [-20, 0]}
+    goal = [["on", "coaster", "shelf"], ["on", "fruitcan", "coaster"]]
+    texts = ("Stack coaster and fruitcan on shelf in order.", "Hide coaster.", "Stack fruitcan on shelf.")
+    tasks = {str(k): {"objects": objects, "goal_text": text, "goal_lits_gt": goal} for k, text in enumerate(texts)}
+    (tmp_path / "tasks.json").write_text(json.dumps(tasks))
+    given = ("--learned", str(learned), "--tasks", str(tmp_path / "tasks.json"))
+    assert run("evaluate", *given, "--states", "20", "--out", str(tmp_path / "evaluation")) == 0
+    (row,) = json.loads((tmp_path / "evaluation" / "results.json").read_text())["rows"]
+    assert (row["tasks"], row["reached"], row["understood"]) == (3, 3, 1)
+    assert row["tried"][0]["unread"] == "" and "'hide' is neither an object" in row["tried"][1]["unread"]
+    assert row["tried"][2]["unread"] == "read as rests_on fruitcan shelf, which is not what the task wants"
+    assert "1 of 3 sentences mean what their tasks want" in (tmp_path / "evaluation" / "table.md").read_text()
+    capsys.readouterr()
+    small = (*given, "--image-width", "240")
+    assert run("plan", *small, "--task", "2", "--out", str(tmp_path / "plan")) == 0
+    assert "'hide' is neither an object" in capsys.readouterr().err  # though --quiet
+    plan = json.loads((tmp_path / "plan" / "plan.json").read_text())
+    assert plan["success"] and "'hide'" in plan["unread"] and len(plan["steps"]) == 4
+    assert run("plan", *small, "--task", "4", "--out", str(tmp_path / "none")) == 3
+    assert run("plan", *small, "--goal", "hide coaster", "--out", str(tmp_path / "odd")) == 4
+    assert "'hide' is neither an object" in capsys.readouterr().err  # though --quiet
 
 
 def test_a_memory_comes_back_from_its_document(learned: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import os
 import re
 import time
 from html.parser import HTMLParser
@@ -343,6 +344,14 @@ def test_folders_of_this_machine_do_not_get_into_the_page(tmp_path):
     made = made_of({"sequence": type(sequence)(sequence.root, manifest=manifest(command))}, tmp_path / "report")[0]
     assert made.command.startswith("scenewright ingest")
     assert "someone" not in made.command
+
+
+def test_a_file_whose_name_is_no_utf8_is_shown_and_linked_by_its_bytes(tmp_path):
+    sequence = make_sequence(tmp_path / "sequence")
+    with open(os.fsencode(tmp_path / "sequence") + b"/odd\xff.txt", "w") as file:
+        file.write("x")
+    (made,) = made_of({"sequence": type(sequence)(sequence.root, manifest=manifest())}, tmp_path / "report")
+    assert ("odd\\xff.txt", "../sequence/odd%FF.txt") in {(entry.name, entry.link) for entry in made.files}
 
 
 def test_nothing_to_report_is_a_usage_error():

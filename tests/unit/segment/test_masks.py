@@ -216,9 +216,7 @@ def test_scores_that_a_format_cannot_hold_are_said_to_be_lost(
         with caplog.at_level(logging.INFO, "scenewright"):
             made = segment(room, tmp_path / f"out {name}", folder, masks_model=model)
         assert payload(made) == payload(service)
-        assert (
-            "holds no scores and overlaps" in caplog.text and "3 by name, 0 by number, 0 by time stamp" in caplog.text
-        )
+        assert "holds no scores and overlaps" in caplog.text and "3 of 3 frames: 3 by name" in caplog.text
 
 
 def test_class_agnostic_masks_are_objects(room: Written, tmp_path: Path) -> None:
@@ -288,15 +286,15 @@ def test_frames_are_found_by_name_number_or_stamp(names: tuple[str, ...], way: s
         with pytest.raises(BadInput, match="3 of 3 masks are of frames that are not there"):
             match_pictures(pictures, TIMES, 0.02, Path("m"))
         return
-    found, ways = match_pictures(pictures, TIMES, 0.02, Path("m"))
-    assert found == {0: 0, 1: 1, 2: 2} and ways == {way: 3}
+    matching = match_pictures(pictures, TIMES, 0.02, Path("m"))
+    assert matching.places == {0: 0, 1: 1, 2: 2} and matching.ways == {way: 3} and not matching.warnings
 
 
 def test_nanoseconds_and_numbers_of_images() -> None:
     now = 1700000000.5
-    found, _ = match_pictures([Picture("1700000000500000000")], np.array([now - 1, now]), 0.02, Path("m"))
-    assert found == {1: 0}
-    assert match_pictures([Picture("", 2)], TIMES, 0.02, Path("m"))[0] == {2: 0}
+    for picture in (Picture("1700000000500000000"), Picture("x_9", None, 1700000000500)):
+        assert match_pictures([picture], np.array([now - 1, now]), 0.02, Path("m")).places == {1: 0}
+    assert match_pictures([Picture("", 2)], TIMES, 0.02, Path("m")).places == {2: 0}
     with pytest.raises(BadInput, match="both of frame 1"):
         match_pictures([Picture("000001"), Picture("", 1)], TIMES, 0.02, Path("m"))
 
@@ -496,7 +494,7 @@ def test_the_text_is_that_of_pycocotools() -> None:
         ({"size": [4, 5], "counts": "5\x00"}, "letters that none has"),
         ({"size": [5, 4], "counts": [20]}, "4 x 5 pixels, the frame of 5 x 4"),
         ({"counts": [20]}, "no RLE"),
-        ([[0, 0, 5, 5, 5, 0]], "polygon"),
+        ([[0, 0, 5, 5, 5, 0]], "no RLE"),
         (None, "no RLE"),
     ],
 )
@@ -591,7 +589,7 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         np.savez(folder / "000000.npz", masks=np.array([{}], dtype=object))
 
     def colours(folder: Path) -> None:
-        cv2.imwrite(str(folder / "000000.png"), np.zeros((*images[0].shape, 3), np.uint8))
+        cv2.imwrite(str(folder / "000000.png"), np.full((*images[0].shape, 3), (1, 2, 3), np.uint8))
 
     def text(folder: Path) -> None:
         (folder / "readme.md").write_text("masks")
@@ -603,7 +601,7 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         beyond: "1 of 3 masks are of frames that are not there: 000009 (name 9)",
         bomb: "unpacks to more than",
         pickled: "holds object",
-        colours: "one channel",
+        colours: "nothing says which class a colour is",
         text: "holds no masks that are read here",
     }
     for write, message in cases.items():

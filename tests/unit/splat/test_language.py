@@ -178,6 +178,7 @@ def test_a_splat_answers(room: tuple[Sequence, Splat], language: LanguageMap, co
     assert inside.mean() > 0.85
     none = ask(language, "red", tmp_path / "none", least_probability=1.0)
     assert none.outcome == "absent" and not none.info.answers and none.info.next_best is not None
+    assert ask(language, "guitar", tmp_path / "unknown", least_probability=1.0).outcome == "unknown"
     again = language_of(room, tmp_path / "again")
     assert again.path("vectors.npz").read_bytes() == language.path("vectors.npz").read_bytes()
 
@@ -205,6 +206,9 @@ def test_what_somebody_knows_is_held_against_the_answers(language: LanguageMap, 
     strict = evaluated(language, tmp_path / "strict", 'absent = ["green"]\n' + told, least_probability=1.0)
     assert strict.info.metrics["words/absent_rejected"] == 1 and strict.info.metrics["words/precision"] is None
     assert "rejected" in strict.path("tables/answers.md").read_text()
+    unread = evaluated(language, tmp_path / "unread", 'absent = ["guitar"]\n' + told, least_probability=1.0)
+    assert "| guitar | no |" in (table := unread.path("tables/answers.md").read_text()) and "| unknown |" in table
+    assert unread.info.metrics["words/absent_rejected"] == 1
 
 
 @pytest.mark.parametrize(

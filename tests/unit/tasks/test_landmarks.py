@@ -46,6 +46,21 @@ def test_twenty_blocks_are_solved() -> None:
     assert again.actions == found.actions
 
 
+def test_a_plan_is_shortened_until_it_fits_within_the_states_allowed() -> None:
+    random = np.random.default_rng(2)
+    names = [f"b{number}" for number in range(9)]
+    goal = frozenset(atom for atom in piles(random, names) if atom[0] == "on")
+    problem = Problem("piles", dict.fromkeys(names, "block"), frozenset(piles(random, names) | {("empty",)}), goal)
+    actions = ground(BLOCKS, problem)
+    plain = plan_task(problem, actions, limit=5000, improvement=5)
+    fitting = plan_task(problem, actions, limit=5000, improvement=5, longest=18)
+    lengths = [len(each.actions or ()) for each in (plain, fitting)]
+    assert lengths == [26, 18] and fitting.expanded < 2000
+    validate(problem, fitting.actions or [])
+    impossible = plan_task(problem, actions, limit=200, improvement=5, longest=1)
+    assert impossible.actions and impossible.expanded < 1000
+
+
 @pytest.mark.parametrize(("start", "goal"), [("abc", "cba"), ("abcd", "bdac")])
 def test_landmarks_are_true_at_some_time_on_every_plan(start: str, goal: str) -> None:
     problem = tower_problem(start, goal)

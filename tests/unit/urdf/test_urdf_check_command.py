@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+import trimesh
 from scenewright.cli.main import run
 from scenewright.stages.urdf.rest_penetration import resting_penetrations
 
@@ -70,3 +71,54 @@ def test_a_missing_file_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture
     assert run(["urdf", "check", str(tmp_path / "none.urdf")]) == 3
     out, err = capfd.readouterr()
     assert (out + err).count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("geometry", "lines"),
+    [
+        ('<cylinder radius="0.1" length="0.2"/>', []),
+        ('<sphere radius="-1"/>', ["link 'cup': sphere of size (-1.0,)"]),
+        ('<cone radius="1"/>', ["link 'cup': URDF has no shape <cone>"]),
+        ('<capsule radius="0" length="1"/>', ["link 'cup': capsule of size (0.0, 1.0)"]),
+    ],
+)
+def test_shapes_without_size_and_of_no_kind(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], geometry: str, lines: list[str]
+) -> None:
+    file = two_boxes(tmp_path / "two.urdf", "floating", 0.3)
+    text, at = file.read_text(), file.read_text().rindex('<box size="0.2 0.2 0.2"/>')
+    file.write_text(text[:at] + geometry + text[at + len('<box size="0.2 0.2 0.2"/>') :])
+    assert run(["urdf", "check", str(file)]) == (3 if lines else 0)
+    assert capfd.readouterr().out.splitlines() == [f"{file}: {line}" for line in lines or ["sound"]]
+
+
+def test_advice_on_capsules_and_unknown_elements(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = two_boxes(tmp_path / "two.urdf", "floating", 0.5)
+    text = file.read_text().replace("</robot>", "<wheel><link/></wheel></robot>")
+    file.write_text(text.replace('<box size="0.2 0.2 0.2"/>', '<capsule radius="0.05" length="0.1"/>', 1))
+    assert run(["urdf", "check", str(file)]) == 0
+    assert capfd.readouterr().out.splitlines() == [
+        f"{file}: sound",
+        f"{file}: advice: link 'table': a capsule is newer than many readers of URDF, which leave it out",
+        f"{file}: advice: robot: <wheel> in <robot> is not read: 1 <link> in it left out",
+    ]
+
+
+@pytest.mark.parametrize(
+    "name", ["package://shop/meshes/cup.obj", "file:///opt/shop/meshes/cup.obj", "/meshes/cup.obj"]
+)
+def test_the_path_that_is_advised_for_a_package_is_sound(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box((0.2, 0.2, 0.2)).export(tmp_path / "meshes" / "cup.obj")
+    file = two_boxes(tmp_path / "two.urdf", "floating", 0.5)
+    text = file.read_text()
+    file.write_text(text.replace('<box size="0.2 0.2 0.2"/>', f'<mesh filename="{name}"/>', 1))
+    assert run(["urdf", "check", str(file)]) == 3
+    assert capfd.readouterr().out.rstrip().endswith("; write 'meshes/cup.obj'")
+    file.write_text(text.replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="meshes/cup.obj"/>', 1))
+    assert run(["urdf", "check", str(file)]) == 0
+    file.write_text(text.replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="package://shop/gone.obj"/>', 1))
+    assert run(["urdf", "check", str(file)]) == 3
+    assert "not found there by its end" in capfd.readouterr().out

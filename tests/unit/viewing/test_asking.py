@@ -93,6 +93,9 @@ def test_a_page_is_told_where_words_fit_and_refused_what_asks_for_nothing(tmp_pa
         status, told = asked(server, "ask", {"text": "red"})
         assert status == 200 and told["answers"][0]["probability"] > 0.5 and not told["calibrated"]
         assert np.allclose(told["answers"][0]["center"], BALLS["red"], atol=0.05)
+        assert not told["unknown"] and not asked(server, "ask", {"text": "green"})[1]["unknown"]
+        nowhere = asked(server, "ask", {"text": "guitar"})[1]
+        assert nowhere["unknown"] == (not nowhere["answers"]) and nowhere["unread"] == ["guitar"]
         assert asked(server, "ask", {"text": " ?! "})[0] == 403
         assert asked(server, "ask", {"text": "x" * 5000})[0] in (400, 403)
         assert asked(server, "ask", {"words": "red"})[0] == 400

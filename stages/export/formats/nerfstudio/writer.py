@@ -29,7 +29,8 @@ def intrinsics(camera: Camera) -> dict[str, float | int]:
 
 
 def write(job: ExportJob) -> None:
-    """Write the frames. Those without colour or pose have no place in the format and are counted.
+    """Write the frames, named by their place in the sequence. Those without colour or pose have no place in the format
+    and are counted.
 
     `timestamp` [s] and `camera_name` are ours; other readers pass over them.
     """
@@ -42,14 +43,14 @@ def write(job: ExportJob) -> None:
             tally.left_out["missing_pose" if frame.world_from_camera is None else "missing_color"] += 1
             continue
         row: dict[str, Any] = {
-            "file_path": f"images/frame_{tally.frames:06d}{picture_suffix(frame.color)}",
+            "file_path": f"images/frame_{frame.index:06d}{picture_suffix(frame.color)}",
             "transform_matrix": (frame.world_from_camera @ OPENCV_FROM_OPENGL).tolist(),
             "timestamp": frame.stamp * 1e-9,
         }
         (root / row["file_path"]).write_bytes(frame.color)
         tally.streams |= {"color", "pose"}
         if frame.depth is not None:
-            row["depth_file_path"] = f"depth/frame_{tally.frames:06d}.png"
+            row["depth_file_path"] = f"depth/frame_{frame.index:06d}.png"
             write_depth_png(root / row["depth_file_path"], frame.depth)
             tally.streams.add("depth")
         if len(cameras) > 1:

@@ -15,7 +15,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.export.formats.ros2 import FORMAT
 from scenewright.stages.export.frames import ExportFrame, ExportJob
 from scenewright.stages.export.pictures import picture_suffix
-from scenewright.stages.kit.formats.frames import LABELS_METADATA, WORLD_FRAME, WORLD_METADATA
+from scenewright.stages.kit.formats.frame_streams import LABELS_METADATA, WORLD_FRAME, WORLD_METADATA
 from scenewright.stages.kit.geometry.transforms import quaternion_of
 from scenewright.stages.kit.ros2_bag import BagWriter, ros2_header, ros2_types
 

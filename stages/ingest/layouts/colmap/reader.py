@@ -17,8 +17,8 @@ from scenewright.stages.ingest.folders.files import (
     DEPTH_SUFFIXES,
     chosen_cameras,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     named_file,
     natural_key,
@@ -27,11 +27,11 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
 from scenewright.stages.ingest.folders.undistortion import PINHOLE, RecordedCamera, lens_of, overridden_recording
 from scenewright.stages.ingest.layouts.colmap.model import ModelCamera, ModelImage, SparseModel, has_model, read_model
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
+from scenewright.stages.ingest.source import Entry, FrameFiles, LoadedFrame, LogSource, SourceCamera, Unusable
 
 IMAGE_FOLDERS = ("images", "image", "rgb", "color")
 DENSE_MAPS = "stereo/depth_maps"
@@ -79,7 +79,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unregistered = _unregistered_images(image_folder, colors)
     counts = {group.name: len(group.members) for group in groups}
     chosen = chosen_cameras(counts, parameters, str(root))
-    units, unit_note = depth_units(parameters, 1.0 if depth_words == DENSE_MAPS else 1000.0)
+    stored, unit_note = (
+        depth_form(parameters, 1.0) if depth_words == DENSE_MAPS else depth_form(parameters, 1000.0, depths)
+    )
     group_of = {index: group for group in groups for index in group.members}
     entries = []
     ordered: list[tuple[str, int | None]] = [(image.name, index) for index, image in enumerate(images)]
@@ -87,13 +89,14 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     for order, (name, index) in enumerate(sorted(ordered, key=lambda item: natural_key(item[0]))):
         time = order / parameters.frame_rate
         if index is None:
-            entries.append(Entry(name, time, None, _never, "missing_pose", chosen[0]))
+            files = FrameFiles(image_folder / name)
+            entries.append(Entry(name, time, None, _never, "missing_pose", chosen[0], files))
         elif group_of[index].name in chosen:
-            form = FrameFormat(recorded[index], group_of[index].camera, has_color, has_depth, units)
-            load = frame_loader(FrameFiles(colors[index], depths[index]), form)
+            form = FrameFormat(recorded[index], group_of[index].camera, has_color, has_depth, stored)
+            files = FrameFiles(colors[index], depths[index])
             pose = images[index].world_from_camera
             problem = "non_rigid_pose" if pose is None else None
-            entries.append(Entry(name, time, pose, load, problem, group_of[index].name))
+            entries.append(Entry(name, time, pose, frame_loader(files, form), problem, group_of[index].name, files))
     lenses = [camera.lens.words for camera in dict.fromkeys(recorded) if not camera.lens.is_pinhole]
     notes = (
         *model_notes,
@@ -201,7 +204,7 @@ def _recorded_cameras(
         of_camera = [index for index, image in enumerate(images) if image.camera == number]
         where = f"{model.folder}: camera {number}"
         size = depth_image_size(path for index in of_camera if (path := depths[index]) is not None)
-        size = size or color_image_size(colors[index] for index in of_camera)
+        size = size or color_image_size((colors[index] for index in of_camera), model.cameras[number].size)
         camera = _camera(model.cameras[number], where).at(size, where)
         cameras[number], notes = overridden_recording(camera, parameters)
     return [cameras[image.camera] for image in images], notes

@@ -197,13 +197,13 @@ def _images_by_role(root: Path) -> FolderImages | None:
 
 def stamps_of(names: tuple[str, ...]) -> np.ndarray | None:
     """Return the stamps (N,) int64 [ns] that file names are, when all are times since 1970: whole nanoseconds (19
-    digits), microseconds (16) or seconds with decimals."""
+    digits), microseconds (16), milliseconds (13) or seconds with decimals."""
     stamps = []
     for name in names:
-        digits = re.fullmatch(r"[0-9]{16}|[0-9]{19}", name)
+        digits = re.fullmatch(r"[0-9]{13}|[0-9]{16}|[0-9]{19}", name)
         seconds = re.fullmatch(r"([0-9]{9,10})\.([0-9]{1,9})", name)
         if digits:
-            stamps.append(int(name) if len(name) == 19 else int(name) * 1000)
+            stamps.append(int(name.ljust(19, "0")))
         elif seconds:
             stamps.append(int(seconds[1]) * 10**9 + int(seconds[2].ljust(9, "0")))
         else:

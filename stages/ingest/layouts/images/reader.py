@@ -14,31 +14,43 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.scene_parts import Camera
-from scenewright.stages.ingest.folders.calibration_files import FolderCalibration, calibration_file, find_calibration
+from scenewright.stages.ingest.clocks import in_file_order, order_note, stamps_problem
+from scenewright.stages.ingest.folders.calibration_files import FolderCalibration
+from scenewright.stages.ingest.folders.calibration_search import NAMES as CALIBRATION_NAMES
+from scenewright.stages.ingest.folders.calibration_search import calibration_of, find_calibration, refuse_several
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     file_bytes,
     raw_depth,
     refuse_exr,
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.pose_files import Pose, pose_file, read_pose_list
-from scenewright.stages.ingest.folders.stamped_poses import LATEST_STAMP, StampedPoses
-from scenewright.stages.ingest.images import depth_millimetres, usable_color
+from scenewright.stages.ingest.folders.pose_files import Pose, columns_of, pose_file, read_pose_list
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes
+from scenewright.stages.ingest.foreign import unread_tables
+from scenewright.stages.ingest.images import DepthForm, decode_as_calibrated, depth_millimetres, usable_color
 from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
 from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
 from scenewright.stages.ingest.lenses import Lens, lens_of
 from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, StreamInfo, Unusable
-from scenewright.stages.ingest.stereo import stereo_lenses
-from scenewright.stages.kit.formats.foxglove import decode_color
-from scenewright.stages.kit.formats.trajectories import number_rows
+from scenewright.stages.ingest.source import (
+    Entry,
+    FrameFiles,
+    LoadedFrame,
+    LogSource,
+    SourceCamera,
+    StreamInfo,
+    Unusable,
+)
+from scenewright.stages.ingest.stereo import in_metres, stereo_lenses
+from scenewright.stages.kit.formats.stamps import exact_stamps
+from scenewright.stages.kit.formats.trajectories import read_text
 
 TIMES = ("times.txt", "timestamps.txt", "timestamp.txt")
 OPTIONS = ("fx", "fy", "cx", "cy")
@@ -52,7 +64,7 @@ def matches(root: Path) -> str | None:
     words = has_images(root)
     if words is None:
         return None
-    file = calibration_file(root)
+    file = calibration_of(root)
     return f"folder with {words}" + (f" and {file.name}" if file else "") + ": plain images"
 
 
@@ -79,22 +91,27 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     refuse_exr((path.name for path in images.depths if path), str(root))
     has_depth = any(images.depths)
     calibration = _calibration(root, images, parameters)
-    size = _size(images, video, has_depth)
-    eyes = _eyes(calibration, size, any(images.rights), root)
-    units, unit_note = depth_units(parameters, 1000.0)
+    size = _size(images, video, has_depth, (calibration.left.width, calibration.left.height))
+    eyes = _eyes(calibration, size, any(images.rights), root, parameters.baseline)
+    units = calibration.depth_units
+    form, unit_note = depth_form(parameters, 1000.0, () if images.depth_is_disparity else images.depths, units)
     if images.depth_is_disparity:
         unit_note = "depth computed from the disparity: Z = fx * baseline / (disparity + doffs)"
     times, time_note = _times(root, names, video, parameters)
-    poses, pose_notes = _poses(root, names, times, calibration, parameters)
+    pictures = [color or depth for color, depth in zip(images.colors, images.depths, strict=True)]
+    stems = [path.stem if path else name for path, name in zip(pictures, images.names, strict=True)]
+    poses, pose_notes = _poses(root, names, stems, times, calibration, parameters)
     entries = []
     for index, name in enumerate(names):
         pose, problem = poses[index]
         load = (
             _video_loader(video, index, eyes)
             if video is not None
-            else _loader(images, index, eyes, has_depth, units, calibration.disparity_offset)
+            else _loader(images, index, eyes, has_depth, form, calibration.disparity_offset)
         )
-        entries.append(Entry(name, times[index] * 1e-9, pose, load, problem))
+        files = FrameFiles() if video is not None else FrameFiles(images.colors[index], images.depths[index])
+        stamp = int(times[index]) if time_note.startswith("times from") else None
+        entries.append(Entry(name, times[index] * 1e-9, pose, load, problem, files=files, stamp=stamp))
     notes = (
         *calibration.notes,
         *eyes.notes,
@@ -124,10 +141,15 @@ def _calibration(root: Path, images: FolderImages, parameters: IngestParameters)
     options = [name for name in OPTIONS if getattr(parameters, name) is not None]
     if all_intrinsics_given(parameters) and not any(images.rights):
         camera = camera_from_options(None, parameters, str(root))
-        return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option",))
+        beside = unread_tables(root, CALIBRATION_NAMES)
+        unread = (f"not read: {beside}, which may hold poses or intrinsics",) if beside else ()
+        return FolderCalibration(_pinhole_record(camera), notes=("intrinsics given by option", *unread))
     calibration = find_calibration(root, images.camera_number)
     if calibration is None:
-        camera_from_options(None, parameters, f"{root}: there is no calibration file")
+        refuse_several(root)
+        beside = unread_tables(root, CALIBRATION_NAMES)
+        why = f"{root}: there is no calibration file" + (f" (not read: {beside})" if beside else "")
+        camera_from_options(None, parameters, why)
         raise BadInput(f"{root}: there is no calibration file for left and right images", hint=PAIR_HINT)
     if options and calibration.right is not None:
         raise UsageError(f"--{options[0]} cannot describe a stereo pair", hint="change the calibration file instead")
@@ -148,17 +170,21 @@ def _pinhole_record(camera: Camera) -> CalibrationRecord:
     return CalibrationRecord(0, "", camera.width, camera.height, "plumb_bob", (), matrix, (), ())
 
 
-def _size(images: FolderImages, video: VideoFrames | None, has_depth: bool) -> tuple[int, int] | None:
+def _size(
+    images: FolderImages, video: VideoFrames | None, has_depth: bool, stated: tuple[int, int]
+) -> tuple[int, int] | None:
     """Return (width, height) of the depth images, of the pictures where there are none."""
     if video is not None:
         return video.size
     if has_depth:
         return depth_image_size(path for path in images.depths if path)
-    return color_image_size(path for path in images.colors if path)
+    return color_image_size((path for path in images.colors if path), stated)
 
 
-def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_right: bool, root: Path) -> _Eyes:
-    """Return the lenses for pictures of `size`."""
+def _eyes(
+    calibration: FolderCalibration, size: tuple[int, int] | None, has_right: bool, root: Path, given: float | None
+) -> _Eyes:
+    """Return the lenses for pictures of `size`; `given` [m] is the baseline that the options say."""
     width, height = size or (calibration.left.width, calibration.left.height)
     side_by_side = calibration.right is not None and not has_right and _is_double(calibration.left, width, height)
     if side_by_side:
@@ -175,9 +201,16 @@ def _eyes(calibration: FolderCalibration, size: tuple[int, int] | None, has_righ
         return _Eyes(lens, notes=lens.notes)
     shape, flat = (width, height), calibration.rectified
     left, right, baseline = stereo_lenses(
-        (sized[0], sized[1]), (shape, shape), (flat, flat), calibration.left_from_right, ("left", "right"), str(root)
+        (sized[0], sized[1]),
+        (shape, shape),
+        (flat, flat),
+        calibration.left_from_right,
+        ("left", "right"),
+        str(root),
+        given,
     )
-    notes = [f"stereo pair, baseline {baseline * 1000:.4g} mm", *left.notes]
+    baseline, unit_note = (baseline, None) if given is not None else in_metres(baseline, str(root))
+    notes = [f"stereo pair, baseline {abs(baseline) * 1000:.4g} mm", *([unit_note] if unit_note else ()), *left.notes]
     if side_by_side:
         notes.append("each picture holds both eyes side by side, left first")
     if calibration.disparity_offset:
@@ -204,13 +237,13 @@ def _with_size(record: CalibrationRecord, width: int, height: int) -> Calibratio
 
 
 def _loader(
-    images: FolderImages, index: int, eyes: _Eyes, has_depth: bool, units: float, disparity_offset: float | None
+    images: FolderImages, index: int, eyes: _Eyes, has_depth: bool, form: DepthForm, disparity_offset: float | None
 ) -> Callable[[], LoadedFrame]:
     color, depth, right = images.colors[index], images.depths[index], images.rights[index]
 
     def load() -> LoadedFrame:
         if eyes.side_by_side:
-            left, second = _halves(_decode(color, "color"), eyes)
+            left, second = _halves(_decode(color, "color", (0, 0)), eyes)
             return LoadedFrame(left, _depth() if has_depth else None, right=second)
         return LoadedFrame(
             _picture(color, eyes.left, "color") if any(images.colors) else None,
@@ -223,9 +256,9 @@ def _loader(
             raise Unusable("missing_depth")
         raw = eyes.left.pixels(raw_depth(depth), "depth")
         if not images.depth_is_disparity:
-            return depth_millimetres(raw, eyes.left.camera, units)
-        metres = depth_of_disparity(raw, eyes.left.camera, eyes.baseline or 0.0, disparity_offset or 0.0)
-        return depth_millimetres(metres, eyes.left.camera, 1.0)
+            return depth_millimetres(raw, eyes.left.camera, form)
+        metres = depth_of_disparity(raw, eyes.left.camera, abs(eyes.baseline or 0.0), disparity_offset or 0.0)
+        return depth_millimetres(metres, eyes.left.camera, DepthForm(1.0))
 
     return load
 
@@ -250,16 +283,16 @@ def _halves(image: np.ndarray, eyes: _Eyes) -> tuple[np.ndarray, np.ndarray]:
 def _picture(path: Path | None, lens: Lens, stream_name: str) -> np.ndarray | bytes:
     """Return a file's picture without distortion; its own bytes where these can be kept."""
     if lens.maps is not None:
-        return lens.picture(_decode(path, stream_name))
+        return lens.picture(_decode(path, stream_name, lens.size))
     if path is None:
         raise Unusable(f"missing_{stream_name}")
     return usable_color(file_bytes(path, stream_name), lens.camera)
 
 
-def _decode(path: Path | None, stream_name: str) -> np.ndarray:
+def _decode(path: Path | None, stream_name: str, size: tuple[int, int]) -> np.ndarray:
     if path is None:
         raise Unusable(f"missing_{stream_name}")
-    image = decode_color(file_bytes(path, stream_name))
+    image = decode_as_calibrated(file_bytes(path, stream_name), size)
     if image is None:
         raise Unusable(f"undecodable_{stream_name}", path.name)
     return image
@@ -287,15 +320,22 @@ def _times(
     """Return the stamp of every frame (N,) int64 [ns], and where it is from."""
     path = next((root / name for name in TIMES if (root / name).is_file()), None)
     if path is not None:
-        seconds = np.array([row[0] for _, row in number_rows(path, 1)])
-        if len(seconds) != len(names):
-            raise BadInput(f"{path}: {len(seconds)} times for {len(names)} images", hint="one line an image, in order")
-        if not (np.isfinite(seconds) & (seconds >= 0) & (seconds < LATEST_STAMP)).all():
-            raise BadInput(f"{path}: times are not between 0 and {LATEST_STAMP} seconds")
-        return np.rint(seconds * 1e9).astype(np.int64), f"times from {path.name}, seconds"
-    stamps = stamps_of(names)
-    if stamps is not None:
-        return stamps, "times from the file names"
+        texts = [line.split("#", 1)[0].strip() for line in read_text(path).splitlines()]
+        rows = [(f"{path}: line {line}", text) for line, text in enumerate(texts, start=1) if text]
+        if len(rows) != len(names):
+            raise BadInput(f"{path}: {len(rows)} times for {len(names)} images", hint="one line an image, in order")
+        column = exact_stamps([text for _, text in rows], [where for where, _ in rows])
+        stamps = np.array([stamp for stamp in column.stamps if stamp is not None], np.int64)
+        poses = pose_file(root)
+        are_looked_up = poses is not None and poses.is_file() and columns_of(poses) == 8
+        problem = None if are_looked_up else stamps_problem(stamps.tolist(), names)
+        if problem is not None:
+            return in_file_order(len(names), parameters.frame_rate), order_note(f"{path.name}: {problem}", parameters)
+        words = column.note or "seconds"
+        return stamps, f"times from {path.name}, {words.removeprefix('stamps in ')}"
+    named = stamps_of(names)
+    if named is not None:
+        return named, "times from the file names"
     rate = video.rate if video is not None and 0 < video.rate < 1e5 else parameters.frame_rate
     where = "of the video" if rate != parameters.frame_rate else "assumed"
     stamps = np.rint(np.arange(len(names)) * 1e9 / rate).astype(np.int64)
@@ -303,17 +343,24 @@ def _times(
 
 
 def _poses(
-    root: Path, names: tuple[str, ...], times: np.ndarray, calibration: FolderCalibration, parameters: IngestParameters
+    root: Path,
+    names: tuple[str, ...],
+    files: list[str],
+    times: np.ndarray,
+    calibration: FolderCalibration,
+    parameters: IngestParameters,
 ) -> tuple[list[Pose], tuple[str, ...]]:
     """Return the pose of each frame, and what was assumed of them."""
     path = pose_file(root)
     if path is None:
         return [(None, None)] * len(names), ()
-    poses = read_pose_list(path, list(names))
+    poses = read_pose_list(path, list(names), files)
     notes: tuple[str, ...] = (f"poses from {path.name}, assumed to be world_from_camera",)
     if isinstance(poses, StampedPoses):
-        notes = (*notes, *poses.notes)
-        poses = [(poses.at(int(stamp), parameters), None) for stamp in times]
+        matrices = [poses.at(int(stamp), parameters) for stamp in times]
+        covered = coverage_notes(poses, [int(t) for t in times], [pose is not None for pose in matrices], parameters)
+        notes = (*notes, *poses.notes, *covered)
+        poses = [(pose, None) for pose in matrices]
     offset = calibration.posed_from_left
     if offset is not None and np.abs(offset - np.eye(4)).max() > 0:
         notes = (*notes, f"poses moved by {offset[0, 3]:.4g} m along x: KITTI states those of camera 0")
@@ -325,7 +372,7 @@ def _poses(
 def _streams(
     images: FolderImages, names: tuple[str, ...], times: np.ndarray, time_note: str, posed: int
 ) -> tuple[StreamInfo, ...]:
-    recorded = not time_note.startswith("times assumed")
+    recorded = time_note.startswith(("times from", "times of"))
     if images.video is not None:
         return (StreamInfo(images.video.name, "color", "video", times if recorded else times[:0], len(names)),)
     streams = []

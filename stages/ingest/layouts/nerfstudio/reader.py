@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +22,8 @@ from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     chosen_cameras,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     named_file,
     natural_key,
     pinhole,
@@ -32,11 +32,12 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
 from scenewright.stages.ingest.folders.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
 from scenewright.stages.ingest.layouts.nerfstudio import replica
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
+from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.geometry.transforms import inverse, is_rigid
 
 NAMES = ("transforms.json", "transforms_train.json")
@@ -58,7 +59,7 @@ class _Frame:
     pose: np.ndarray | None
     problem: str | None
     time: float | None
-    """`timestamp` of the frame [s], which our own exports have."""
+    """`timestamp` of the frame [s], which our own exports have; in any unit until all frames are known."""
     fields: dict[str, Any]
     """Intrinsics of the frame over those of the file."""
 
@@ -96,7 +97,11 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         raise BadInput(f"{file}: has no list of frames")
     frames = sorted(_frames(document, file), key=lambda frame: natural_key(frame.name))
     stamped = all(frame.time is not None for frame in frames)
+    column = None
     if stamped:
+        column = exact_stamps([repr(frame.time) for frame in frames], [frame.where for frame in frames])
+        timed = zip(frames, column.stamps, strict=True)
+        frames = [replace(frame, time=(stamp or 0) * 1e-9) for frame, stamp in timed]
         frames.sort(key=lambda frame: frame.time or 0.0)
     has_depth = any(frame.depth is not None for frame in frames)
     has_color = not has_depth or any(frame.color is not None and frame.color.is_file() for frame in frames)
@@ -104,7 +109,8 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
     if not default_unit > 0:
         raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
-    units, unit_note = depth_units(parameters, 1 / default_unit)
+    unstated = [] if "depth_unit_scale_factor" in document else [frame.depth for frame in frames]
+    stored, unit_note = depth_form(parameters, 1 / default_unit, unstated)
     recorded, notes_of_options = _recorded_cameras(frames, has_depth, parameters)
     groups, group_notes = grouped(recorded, _labels(frames, recorded))
     counts = {group.name: len(group.members) for group in groups}
@@ -116,11 +122,14 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         group = group_of[index]
         if group.name not in chosen:
             continue
-        form = FrameFormat(recorded[index], group.camera, has_color, has_depth, units)
-        load = frame_loader(FrameFiles(frame.color, frame.depth), form)
+        form = FrameFormat(recorded[index], group.camera, has_color, has_depth, stored)
+        files = FrameFiles(frame.color, frame.depth)
         pose = None if frame.pose is None else world(frame.pose)
         time = index / parameters.frame_rate if frame.time is None or not stamped else frame.time
-        entries.append(Entry(frame.name, time, pose, load, frame.problem, group.name))
+        stamp = None if frame.time is None else round(frame.time * 1e9)
+        entries.append(
+            Entry(frame.name, time, pose, frame_loader(files, form), frame.problem, group.name, files, stamp)
+        )
     cameras = [SourceCamera(group.name, group.camera) for group in groups if group.name in chosen]
     if not cameras:
         raise BadInput(f"{file}: has no frames")
@@ -136,8 +145,8 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         ),
         *((unit_note,) if has_depth else ()),
         *world_notes,
-        "times from timestamp"
-        if stamped
+        f"times from timestamp{f', {column.note}' if column.note else ''}"
+        if column is not None
         else f"times assumed: order of the names / {parameters.frame_rate:g} per second",
     )
     stamps = np.array([round((frame.time or 0.0) * 1e9) for frame in frames if stamped], np.int64)
@@ -182,7 +191,7 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
                 None if depth is None else named_file(root, depth, where),
                 pose,
                 problem,
-                None if fields.get("timestamp") is None else _number(fields, "timestamp", where, largest=9e9),
+                None if fields.get("timestamp") is None else _number(fields, "timestamp", where, largest=9e18),
                 {**shared, **fields},
             )
         )
@@ -227,7 +236,7 @@ def _recorded_cameras(
     for stated_camera, same in alike.items():
         where = same[0].where
         color_size = (
-            color_image_size(frame.color for frame in same if frame.color)
+            color_image_size((frame.color for frame in same if frame.color), stated_camera.size or (0, 0))
             if stated_camera.size is None or not has_depth
             else None
         )

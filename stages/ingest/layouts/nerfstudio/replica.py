@@ -9,8 +9,8 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import (
     camera_from_options,
+    depth_form,
     depth_image_size,
-    depth_units,
     image_loader,
     images_by_number,
     overridden,
@@ -21,7 +21,7 @@ from scenewright.stages.ingest.folders.files import (
     text_stream,
 )
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import number_rows
 
 TRAJECTORY, RESULTS, CAMERA = "traj.txt", "results", "cam_params.json"
@@ -56,13 +56,14 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     else:
         camera, source = camera_from_options(size, parameters, f"{root}: there is no {CAMERA}"), "no cam_params.json"
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, default_units)
+    form, unit_note = depth_form(parameters, default_units)
     entries = tuple(
         Entry(
             f"frame {number}",
             number / parameters.frame_rate,
             rows[number][1].reshape(4, 4) if number < len(rows) else None,
-            image_loader(colors.get(number), depths.get(number), camera, units, has_color=bool(colors)),
+            image_loader(colors.get(number), depths.get(number), camera, form, has_color=bool(colors)),
+            files=FrameFiles(colors.get(number), depths.get(number)),
         )
         for number in numbers
     )

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.ingest.folders.calibration_files import calibration_file
+from scenewright.stages.ingest.folders.calibration_search import calibration_of
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     camera_from_options,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     image_loader,
     images_by_stem,
@@ -27,7 +27,7 @@ from scenewright.stages.ingest.folders.files import (
 )
 from scenewright.stages.ingest.folders.pose_files import columns_of
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import number_rows, transform_from_numbers
 
 COLOR_FOLDERS = ("color", "rgb", "image")
@@ -40,7 +40,7 @@ def matches(root: Path) -> str | None:
     poses = next((name for name in POSES if (root / name).is_file()), None)
     if poses is None or not (root / "depth").is_dir():
         return None
-    if calibration_file(root) is not None or columns_of(root / poses) in (8, 12, 13, 16, 17):
+    if calibration_of(root) is not None or columns_of(root / poses) in (8, 12, 13, 16, 17):
         return None
     return f"folder with {f'{color.name}/, ' if color else ''}depth/ and {poses}: posed images"
 
@@ -56,12 +56,13 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if len(rows) != len(stems):
         raise BadInput(f"{pose_file}: {len(rows)} poses for {len(stems)} images", hint="one line an image, in order")
     camera = camera_from_options(depth_image_size(list(depths.values())), parameters, f"{root}: posed images")
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0, depths.values())
     entries = []
     for index, (stem, (line, numbers)) in enumerate(zip(stems, rows, strict=True)):
         pose, problem = _pose(numbers, f"{pose_file}: line {line}")
-        loader = image_loader(colors.get(stem), depths.get(stem), camera, units, has_color=bool(colors))
-        entries.append(Entry(stem, index / parameters.frame_rate, pose, loader, problem))
+        files = FrameFiles(colors.get(stem), depths.get(stem))
+        loader = image_loader(files.color, files.depth, camera, form, has_color=bool(colors))
+        entries.append(Entry(stem, index / parameters.frame_rate, pose, loader, problem, files=files))
     notes = (
         "intrinsics given by option",
         unit_note,

@@ -10,8 +10,9 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
+    camera_from_options,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     image_loader,
     images_by_stem,
@@ -22,7 +23,7 @@ from scenewright.stages.ingest.folders.files import (
     text_stream,
 )
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_open3d_log
 
 COLOR_FOLDERS = ("image", "color", "rgb")
@@ -46,9 +47,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     colors = list(images_of_subfolder(color_folder, COLOR_SUFFIXES).values())
     depths = list(images_by_stem(root / "depth", DEPTH_SUFFIXES).values())
     poses = read_open3d_log(root / TRAJECTORY)
-    camera, notes = _camera(root, depth_image_size(depths))
+    camera, notes = _camera(root, depth_image_size(depths), parameters)
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0, depths)
     if colors and len(colors) != len(depths):
         raise BadInput(
             f"{root}: {len(colors)} colour and {len(depths)} depth images are not pairs",
@@ -62,7 +63,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             name=depth.name,
             time=index / parameters.frame_rate,
             world_from_camera=poses[index] if index < len(poses) else None,
-            load=image_loader(color, depth, camera, units, has_color=bool(colors)),
+            load=image_loader(color, depth, camera, form, has_color=bool(colors)),
+            files=FrameFiles(color, depth),
         )
         for index, (color, depth) in enumerate(zip(paired, depths, strict=True))
     )
@@ -75,16 +77,15 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     return LogSource("redwood", rule, (SourceCamera("camera", camera),), entries, notes, streams=streams)
 
 
-def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str, ...]]:
+def _camera(root: Path, size: tuple[int, int] | None, parameters: IngestParameters) -> tuple[Camera, tuple[str, ...]]:
     width, height = size or (0, 0)
     for name in INTRINSICS:
         path = root / name
         if path.exists():
             return _read_intrinsics(path, size), (f"intrinsics read from {name}",)
     if size is not None and size != (640, 480):
-        raise BadInput(
-            f"{root}: images are {width}x{height} and there is no {INTRINSICS[0]}", hint="add it (Open3D layout)"
-        )
+        why = f"{root}: images are {width}x{height} and there is no {INTRINSICS[0]} (Open3D layout)"
+        return camera_from_options(size, parameters, why), ()
     note = "intrinsics assumed: PrimeSense default, fx = fy = 525, cx = 319.5, cy = 239.5"
     return Camera(width=width, height=height, **PRIMESENSE), (note,)
 

@@ -19,8 +19,8 @@ from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     file_bytes,
     images_by_number,
     overridden,
@@ -29,9 +29,9 @@ from scenewright.stages.ingest.folders.files import (
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.images import usable_color, usable_depth
+from scenewright.stages.ingest.images import DepthForm, usable_color, usable_depth
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, SourceCamera, Unusable
+from scenewright.stages.ingest.source import Entry, FrameFiles, LoadedFrame, LogSource, SourceCamera, Unusable
 from scenewright.stages.kit.formats.trajectories import read_matrix, read_text
 
 INTRINSIC_FILES = ("intrinsic/intrinsic_depth.txt", "intrinsic_depth.txt")
@@ -75,15 +75,16 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     poses = images_by_number(path / "pose", (".txt",))
     calibration = _calibration(path, depth_image_size(depths.values()), color_image_size(colors.values()))
     camera, notes_of_options = overridden(calibration.depth, parameters)
-    units, unit_note = depth_units(parameters, calibration.units_per_metre)
+    form, unit_note = depth_form(parameters, calibration.units_per_metre)
     entries = []
     for number in sorted(colors.keys() | depths.keys()):
         pose, problem = _pose(poses.get(number))
         color_camera = calibration.color if colors else None
-        load = _loader(colors.get(number), depths.get(number), color_camera, camera, units)
+        load = _loader(colors.get(number), depths.get(number), color_camera, camera, form)
         if color_camera is not None and calibration.color != camera:
             load = registered_loader(load, camera, calibration.color, np.eye(4))
-        entries.append(Entry(f"frame {number}", number / parameters.frame_rate, pose, load, problem))
+        files = FrameFiles(colors.get(number), depths.get(number))
+        entries.append(Entry(f"frame {number}", number / parameters.frame_rate, pose, load, problem, files=files))
     stray = len(poses.keys() - colors.keys() - depths.keys())
     notes = (
         *calibration.notes,
@@ -102,7 +103,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
 
 
 def _loader(
-    color: Path | None, depth: Path | None, color_camera: Camera | None, depth_camera: Camera, units: float
+    color: Path | None, depth: Path | None, color_camera: Camera | None, depth_camera: Camera, form: DepthForm
 ) -> Callable[[], LoadedFrame]:
     """Return a function that reads a frame's images; without a colour camera the log has no colour."""
 
@@ -113,7 +114,7 @@ def _loader(
             raise Unusable("missing_depth")
         return LoadedFrame(
             None if color is None or color_camera is None else usable_color(file_bytes(color, "color"), color_camera),
-            usable_depth(file_bytes(depth, "depth"), depth_camera, units),
+            usable_depth(file_bytes(depth, "depth"), depth_camera, form),
         )
 
     return load

@@ -18,8 +18,8 @@ from scenewright.stages.ingest.folders.files import (
     DEPTH_SUFFIXES,
     all_intrinsics_given,
     camera_from_options,
+    depth_form,
     depth_image_size,
-    depth_units,
     first_subfolder,
     image_loader,
     images_by_number,
@@ -30,7 +30,7 @@ from scenewright.stages.ingest.folders.files import (
     text_stream,
 )
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_numbered_open3d_log, read_text
 
 COLOR_FOLDERS = ("image", "rgb")
@@ -68,14 +68,16 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     stray = len(poses.keys() - set(numbers))
     times = _times(root)
     camera, notes = _camera(root, depth_image_size(depths.values()), parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0, depths.values())
     entries = [
         Entry(
             name=f"frame {number}",
             time=times.get(number, 0) * 1e-6 if times else (number - first) / parameters.frame_rate,
             world_from_camera=poses.get(number),
-            load=image_loader(colors.get(number), depths.get(number), camera, units, has_color=bool(colors)),
+            load=image_loader(colors.get(number), depths.get(number), camera, form, has_color=bool(colors)),
             problem="missing_time" if times and number not in times else None,
+            files=FrameFiles(colors.get(number), depths.get(number)),
+            stamp=times[number] * 1000 if number in times else None,
         )
         for number in numbers
     ]

@@ -9,9 +9,16 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.color_registration import registered_loader
-from scenewright.stages.ingest.folders.files import depth_image_size, depth_units, image_loader, overridden, stream
+from scenewright.stages.ingest.folders.files import (
+    camera_from_options,
+    depth_form,
+    depth_image_size,
+    image_loader,
+    overridden,
+    stream,
+)
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera
 from scenewright.stages.kit.formats.trajectories import read_matrix
 from scenewright.stages.kit.geometry.transforms import transform_from
 
@@ -45,9 +52,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if match:
             files.setdefault(int(match[1]), {})[match[2]] = path
     size = depth_image_size([images["depth"] for _, images in sorted(files.items()) if "depth" in images])
-    camera, notes = _camera(root, size)
+    camera, notes = _camera(root, size, parameters)
     camera, notes_of_options = overridden(camera, parameters)
-    units, unit_note = depth_units(parameters, 1000.0)
+    form, unit_note = depth_form(parameters, 1000.0, [images.get("depth") for _, images in sorted(files.items())])
     theirs = _is_seven_scenes_kinect(camera)  # other people record in this layout too
     register = parameters.register_color and theirs
     has_color = any("color" in images for images in files.values())
@@ -55,7 +62,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     for number in sorted(files):
         images = files[number]
         pose, problem = _pose(images.get("pose"))
-        load = image_loader(images.get("color"), images.get("depth"), camera, units, has_color=has_color)
+        load = image_loader(images.get("color"), images.get("depth"), camera, form, has_color=has_color)
         if register:
             load = registered_loader(load, camera, COLOR_CAMERA, COLOR_FROM_DEPTH)
         entries.append(
@@ -65,6 +72,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
                 world_from_camera=pose,
                 load=load,
                 problem=problem,
+                files=FrameFiles(images.get("color"), images.get("depth")),
             )
         )
     notes = (
@@ -88,7 +96,7 @@ def _is_seven_scenes_kinect(camera: Camera) -> bool:
     return (camera.width, camera.height) == (640, 480) and abs(camera.fx - DEFAULT_FOCAL_LENGTH) < 1
 
 
-def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str, ...]]:
+def _camera(root: Path, size: tuple[int, int] | None, parameters: IngestParameters) -> tuple[Camera, tuple[str, ...]]:
     width, height = size or (0, 0)
     path = root / "camera-intrinsics.txt"
     if path.exists():
@@ -99,9 +107,8 @@ def _camera(root: Path, size: tuple[int, int] | None) -> tuple[Camera, tuple[str
         camera = Camera.of_outside(path, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
         return camera, (f"intrinsics read from {path.name}",)
     if size is not None and size != (640, 480):
-        raise BadInput(
-            f"{root}: images are {width}x{height} and there is no {path.name}", hint="give --fx --fy --cx --cy"
-        )
+        why = f"{root}: images are {width}x{height} and there is no {path.name}"
+        return camera_from_options(size, parameters, why), ()
     camera = Camera(
         width=width,
         height=height,

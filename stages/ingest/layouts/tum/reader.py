@@ -9,29 +9,39 @@ by option does that.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.association import mutual_nearest
+from scenewright.stages.ingest.clocks import in_file_order, order_note, stamps_problem
+from scenewright.stages.ingest.folders.calibration_files import read_calibration
+from scenewright.stages.ingest.folders.calibration_search import calibration_of, refuse_several
+from scenewright.stages.ingest.folders.depth_units import settled_units
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
     color_image_size,
+    depth_form,
     depth_image_size,
-    depth_units,
     named_file,
     pinhole,
     refuse_exr,
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFiles, FrameFormat, frame_loader
-from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, exact_stamp, read_stamped_poses
-from scenewright.stages.ingest.folders.undistortion import RecordedCamera, lens_of, overridden_recording
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes, read_stamped_poses, scaled
+from scenewright.stages.ingest.folders.undistortion import (
+    RecordedCamera,
+    lens_of,
+    overridden_recording,
+    recorded_camera,
+)
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.source import Entry, LogSource, SourceCamera
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, Role, SourceCamera
+from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.formats.trajectories import read_text
 
 COLOR_LIST, DEPTH_LIST = "rgb.txt", "depth.txt"
@@ -49,6 +59,8 @@ FREIBURG_NAME = re.compile(r"(?:freiburg|(?<![a-z])fr)([123])(?!\d)")
 ICL_NUIM = (481.2, 480.0, 319.5, 239.5)
 """Intrinsics fx, fy, cx, cy [px] of ICL-NUIM for 640 x 480, as the data set states them."""
 ICL_NUIM_NAME = re.compile(r"icl[-_ ]?nuim|(?:living_?room|office)_?traj\d|(?<![a-z])(?:lr|of)_?kt\d")
+D435_FOCAL, KINECT_FOCAL = 615 / 480, 525 / 480
+"""Focal length of the colour cameras that most such folders are of, in heights of the picture."""
 MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
 """Mirrors y, before and after a pose: ICL-NUIM's camera has its y axis the other way round."""
 
@@ -58,8 +70,10 @@ class _Stamped:
     """The images that a list names."""
 
     stamps: np.ndarray
-    """(N,) int64 [ns], ascending."""
+    """(N,) int64 [ns], in file order."""
     paths: tuple[Path, ...]
+    note: str = ""
+    """What the stamps were taken for, for people."""
 
 
 def matches(root: Path) -> str | None:
@@ -82,15 +96,18 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unit = 1 / parameters.frame_rate if icl_nuim else 1.0
     colors, depths = _images(root, unit)
     refuse_exr((path.name for path in depths.paths), str(root))
+    listed: list[tuple[str, Role, _Stamped]] = [("rgb", "color", colors), ("depth", "depth", depths)]
     poses = _poses(root, unit)
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)
-    recorded, notes = _camera(root, size, parameters, icl_nuim)
+    recorded, stated, notes = _camera(root, size, parameters, icl_nuim)
     recorded, notes_of_options = overridden_recording(recorded, parameters)
-    units, unit_note = depth_units(parameters, UNITS_PER_METRE)
-    form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), units)
-    tolerance = round(parameters.maximum_time_difference * 1e9)
+    freiburg = FREIBURG_NAME.search(root.resolve().name.lower()) is not None
+    known = poses is not None or stated is not None or icl_nuim or freiburg
+    units, doubt = (UNITS_PER_METRE, "") if known else settled_units(UNITS_PER_METRE, depths.paths, parameters)
+    stored, unit_note = depth_form(parameters, units, depths.paths, stated)
+    form = FrameFormat(recorded, recorded.camera, bool(colors.paths), bool(depths.paths), stored)
+    colors, depths, partners, no_clock = _paired(root, colors, depths, parameters, poses is not None)
     main_list = colors if colors.paths else depths
-    partners = mutual_nearest(main_list.stamps, depths.stamps, tolerance)
     entries = []
     for stamp, path, partner in zip(main_list.stamps, main_list.paths, partners, strict=True):
         missing = bool(depths.paths) and partner < 0
@@ -101,24 +118,40 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if pose is not None and icl_nuim:
             pose = MIRROR @ pose @ MIRROR
         problem = "no_depth_within_tolerance" if missing else None
-        load = frame_loader(FrameFiles(path if colors.paths else None, depth), form)
-        entries.append(Entry(str(path.relative_to(root)), moment * 1e-9, pose, load, problem))
+        files = FrameFiles(path if colors.paths else None, depth)
+        own_stamp = None if icl_nuim or no_clock is not None else int(stamp)
+        entries.append(
+            Entry(
+                str(path.relative_to(root)),
+                moment * 1e-9,
+                pose,
+                frame_loader(files, form),
+                problem,
+                files=files,
+                stamp=own_stamp,
+            )
+        )
+    posed = [entry.world_from_camera is not None for entry in entries]
+    covered = coverage_notes(poses, [round(entry.time * 1e9) for entry in entries], posed, parameters) if poses else ()
     unpaired = len(depths.paths) - int((partners >= 0).sum())
     notes = (
         *notes,
         *notes_of_options,
         *((unit_note,) if depths.paths else ()),
+        *((doubt,) if doubt else ()),
+        *((order_note(no_clock, parameters),) if no_clock is not None else ()),
+        *dict.fromkeys(f"images: {images.note}" for _, _, images in listed if images.note and no_clock is None),
         *(poses.notes if poses else ()),
+        *covered,
         *((f"{unpaired} depth images are paired with no colour image",) if unpaired else ()),
         *(_icl_notes(parameters) if icl_nuim else ()),
     )
-    streams = [stream("rgb", "color", colors.paths, colors.stamps)] if colors.paths else []
-    if depths.paths:
-        streams.append(stream("depth", "depth", depths.paths, depths.stamps))
+    streams = [stream(name, role, images.paths, images.stamps) for name, role, images in listed if images.paths]
     if poses:
         streams.append(text_stream("groundtruth.txt", "pose", len(poses.stamps), poses.stamps))
     camera = SourceCamera("camera", recorded.camera)
-    return LogSource("tum", rule, (camera,), tuple(entries), notes, streams=tuple(streams))
+    missing = {} if any(posed) or not covered else {"pose": "; ".join(covered).removeprefix("WARNING: ")}
+    return LogSource("tum", rule, (camera,), tuple(entries), notes, streams=tuple(streams), missing=missing)
 
 
 def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
@@ -126,31 +159,38 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
     path = next((root / name for name in ASSOCIATIONS if (root / name).is_file()), None)
     if path is None or (root / COLOR_LIST).is_file():
         colors, depths = (
-            _read_list(root, name, unit) if (root / name).is_file() else _sort_by_time([], [])
+            _read_list(root, name, unit) if (root / name).is_file() else _Stamped(np.zeros(0, np.int64), ())
             for name in (COLOR_LIST, DEPTH_LIST)
         )
         return colors, depths
-    columns: tuple[tuple[list[int], list[Path]], ...] = (([], []), ([], []))
+    columns: tuple[list[tuple[str, str, str]], ...] = ([], [])
     for where, fields in _rows(path):
         if len(fields) != 4:
             raise BadInput(f"{where}: {len(fields)} columns, expected stamp, name, stamp, name")
         pairs = [(fields[0], fields[1]), (fields[2], fields[3])]
         if "depth" in fields[1].split("/")[0] and "depth" not in fields[3].split("/")[0]:
             pairs.reverse()  # ICL-NUIM lists depth first
-        for (stamps, paths), (stamp, name) in zip(columns, pairs, strict=True):
-            stamps.append(round(exact_stamp(stamp, where) * unit))
-            paths.append(named_file(root, name, where))
-    return _sort_by_time(*columns[0]), _sort_by_time(*columns[1])
+        for column, (stamp, name) in zip(columns, pairs, strict=True):
+            column.append((where, stamp, name))
+    return _stamped(root, columns[0], unit), _stamped(root, columns[1], unit)
 
 
 def _read_list(root: Path, name: str, unit: float) -> _Stamped:
-    stamps, paths = [], []
+    rows = []
     for where, fields in _rows(root / name, maximum_splits=1):
         if len(fields) != 2:
             raise BadInput(f"{where}: expected a time stamp and a file name")
-        stamps.append(round(exact_stamp(fields[0], where) * unit))
-        paths.append(named_file(root, fields[1].strip(), where))
-    return _sort_by_time(stamps, paths)
+        rows.append((where, fields[0], fields[1].strip()))
+    return _stamped(root, rows, unit)
+
+
+def _stamped(root: Path, rows: list[tuple[str, str, str]], unit: float) -> _Stamped:
+    """Return the images of rows (place, stamp, name)."""
+    column = exact_stamps([stamp for _, stamp, _ in rows], [where for where, _, _ in rows])
+    stamps = [scaled(stamp, unit) for stamp in column.stamps if stamp is not None]
+    return _Stamped(
+        np.array(stamps, np.int64), tuple(named_file(root, name, where) for where, _, name in rows), column.note
+    )
 
 
 def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
@@ -163,9 +203,36 @@ def _rows(path: Path, maximum_splits: int = -1) -> list[tuple[str, list[str]]]:
     ]
 
 
-def _sort_by_time(stamps: list[int], paths: list[Path]) -> _Stamped:
-    order = sorted(range(len(stamps)), key=lambda index: stamps[index])
-    return _Stamped(np.array([stamps[i] for i in order], np.int64), tuple(paths[i] for i in order))
+def _paired(
+    root: Path, colors: _Stamped, depths: _Stamped, parameters: IngestParameters, has_poses: bool
+) -> tuple[_Stamped, _Stamped, np.ndarray, str | None]:
+    """Return colour and depth in time order, for each image of the main list (N,) the index of its depth or -1, and why
+    their stamps are no clock's.
+
+    Such stamps say nothing: images are then paired by their order in the file. Poses with stamps are looked up by
+    them, right or wrong. Raises BadInput when lists of two lengths are to be paired by order.
+    """
+    problems = (stamps_problem(each.stamps.tolist(), [path.name for path in each.paths]) for each in (colors, depths))
+    problem = None if has_poses else next((found for found in problems if found is not None), None)
+    if problem is None:
+        colors, depths = _by_time(colors), _by_time(depths)
+        tolerance = round(parameters.maximum_time_difference * 1e9)
+        main_list = colors if colors.paths else depths
+        return colors, depths, mutual_nearest(main_list.stamps, depths.stamps, tolerance), None
+    counts = len(colors.paths), len(depths.paths)
+    if all(counts) and counts[0] != counts[1]:
+        raise BadInput(
+            f"{root}: {problem}, and {counts[0]} pictures and {counts[1]} depth images have no common order",
+            hint=f"put {ASSOCIATIONS[1]} in the place of {COLOR_LIST}: a line `number picture number depth` a frame",
+        )
+    stamps = in_file_order(max(counts), parameters.frame_rate)
+    colors, depths = (replace(each, stamps=stamps[: len(each.paths)]) for each in (colors, depths))
+    return colors, depths, np.arange(max(counts)) if counts[1] else np.full(counts[0], -1), problem
+
+
+def _by_time(images: _Stamped) -> _Stamped:
+    order = np.argsort(images.stamps, kind="stable")
+    return replace(images, stamps=images.stamps[order], paths=tuple(images.paths[i] for i in order))
 
 
 def _poses(root: Path, unit: float) -> StampedPoses | None:
@@ -189,15 +256,23 @@ def _icl_notes(parameters: IngestParameters) -> tuple[str, ...]:
 
 def _camera(
     root: Path, size: tuple[int, int] | None, parameters: IngestParameters, icl_nuim: bool
-) -> tuple[RecordedCamera, tuple[str, ...]]:
-    """Return the colour camera: from a file, else the data set's own by the folder's name, else from options."""
-    path = next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
+) -> tuple[RecordedCamera, float | None, tuple[str, ...]]:
+    """Return the colour camera, from a file, else the data set's own by the folder's name, else from options; and the
+    stored depth per metre where the file states it."""
+    given = all_intrinsics_given(parameters)  # what files say of the camera does not count then
+    path = None if given else next((root / name for name in CALIBRATIONS if (root / name).is_file()), None)
     if path is not None:
-        return _read_calibration(path, size), (f"intrinsics read from {path.name}",)
+        return _read_calibration(path, size), None, (f"intrinsics read from {path.name}",)
+    path = None if given else calibration_of(root)
+    if path is not None:
+        calibration = read_calibration(path)
+        return recorded_camera(calibration.left, size, str(path)), calibration.depth_units, calibration.notes
     standard = size in (None, (640, 480))
     if icl_nuim and standard:
-        return RecordedCamera(pinhole(ICL_NUIM, size, str(root))), (
-            "intrinsics assumed: ICL-NUIM, 481.2 480 319.5 239.5",
+        return (
+            RecordedCamera(pinhole(ICL_NUIM, size, str(root))),
+            None,
+            ("intrinsics assumed: ICL-NUIM, 481.2 480 319.5 239.5",),
         )
     match = FREIBURG_NAME.search(root.resolve().name.lower())
     if match and standard:
@@ -205,14 +280,27 @@ def _camera(
         listed = " ".join(f"{value:g}" for value in numbers)
         recorded = RecordedCamera(pinhole(numbers, size, str(root)), lens_of(coefficients, str(root)))
         undone = ", lens distortion undone in colour and depth" if coefficients else ""
-        return recorded, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
-    if all_intrinsics_given(parameters):
-        return RecordedCamera(camera_from_options(size, parameters, str(root))), ()
+        return recorded, None, (f"intrinsics assumed: freiburg{match[1]} colour camera, {listed}{undone}",)
+    if given:
+        return RecordedCamera(camera_from_options(size, parameters, str(root))), None, ()
+    refuse_several(root)
     shape = f"images are {size[0]}x{size[1]}" if size else "no image can be decoded"
     raise BadInput(
         f"{root}: intrinsics are not known: there is no {CALIBRATIONS[0]}, and the folder's name and images ({shape}) "
         "are not those of freiburg1, 2 or 3",
-        hint="give --fx --fy --cx --cy",
+        hint=f"give --fx --fy --cx --cy{_usual_intrinsics(size)}",
+    )
+
+
+def _usual_intrinsics(size: tuple[int, int] | None) -> str:
+    """Return what to try where the camera can't be asked."""
+    if size is None:
+        return ""
+    width, height = size
+    return (
+        " as the camera's driver states them; where nobody knows them, those of a RealSense D435 are about "
+        f"--fx {D435_FOCAL * height:.4g} --fy {D435_FOCAL * height:.4g} --cx {width / 2:g} --cy {height / 2:g}, "
+        f"of a Kinect --fx {KINECT_FOCAL * height:.4g} --fy {KINECT_FOCAL * height:.4g}"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import json
 import os
@@ -310,7 +311,8 @@ class PageCanvas:
             partial.write_bytes(page)
             partial.replace(save)
         except OSError as error:
-            partial.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                partial.unlink(missing_ok=True)
             raise MachineFailure(f"{save}: {error.strerror}", hint="choose another --save") from None
 
 

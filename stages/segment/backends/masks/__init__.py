@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 from scenewright.stages.kit.labels import LABEL_TABLES
 from scenewright.stages.kit.stage import Parameters
@@ -17,6 +19,11 @@ class MasksParameters(Parameters):
     masks_tolerance: float = Field(
         0.02, ge=0, description="Masks with a time stamp belong to the frame at most this far from it [s]"
     )
+    masks_named_like: Literal["auto", "log", "sequence"] = Field(
+        "auto",
+        description="Masks are named like the log's pictures (log), or by numbers of the sequence's frames (sequence); "
+        "auto takes the log's names where masks have them",
+    )
 
 
 BACKEND = BackendDeclaration(
@@ -24,6 +31,6 @@ BACKEND = BackendDeclaration(
     summary="the masks of a folder (--masks), made by a network of one's own",
     order=75,
     parameters=MasksParameters,
-    exclusive=("masks_model", "masks_tolerance"),
+    exclusive=("masks_model", "masks_tolerance", "masks_named_like"),
     data_files=lambda parameters: LABEL_TABLES,
 )

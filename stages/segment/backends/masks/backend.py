@@ -14,7 +14,9 @@ from scenewright.stages.kit.labels import ANYTHING, Label, LabelSet, match_label
 from scenewright.stages.segment.backends.masks import MasksParameters
 from scenewright.stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
 from scenewright.stages.segment.backends.masks.listing import HINT, Listing
+from scenewright.stages.segment.backends.masks.log_names import log_names
 from scenewright.stages.segment.backends.masks.matching import WAYS, match_pictures
+from scenewright.stages.segment.backends.masks.unread import kinds_of_files, way_of
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
 from scenewright.stages.segment.naming import NamedSegment, name_segments
@@ -34,6 +36,8 @@ class Tally:
     frames: int = 0
     """In which masks overlapped."""
     faint: int = 0
+    empty: int = 0
+    ignored_frames: int = 0
 
 
 class MasksBackend:
@@ -44,15 +48,27 @@ class MasksBackend:
     streams: tuple[str, ...] = ("depth",)
 
     def __init__(self, request: BackendRequest) -> None:
-        _, reader = request.log()
+        sequence, reader = request.log()
         assert request.masks is not None  # segment.parameters.check
         options = request.own(MasksParameters)
         self._root = request.masks
-        listing = Listing(request.masks)
+        label_set = read_label_file(request.labels) if request.labels else None
+        numbered = {label.id: label.name for label in label_set.labels if label.id is not None} if label_set else {}
+        listing = Listing(request.masks, numbered)
         form, self._source = open_folder(listing)
-        times = reader.times
-        self._places, match_counts = match_pictures(self._source.pictures, times, options.masks_tolerance, self._root)
-        matches_text = ", ".join(f"{match_counts[matching]} by {matching}" for matching in WAYS)
+        times, own = reader.times, sequence.sources
+        matching = match_pictures(
+            self._source.pictures,
+            times if own is None else own.times_beside(times),
+            options.masks_tolerance,
+            self._root,
+            log_names(own),
+            options.masks_named_like,
+        )
+        self._places = matching.places
+        matches_text = ", ".join(f"{matching.ways[way]} by {way}" for way in WAYS if matching.ways[way]) or "none"
+        for warning in matching.warnings:
+            logger.warning("%s: %s", self._root, warning)
         logger.info(
             "%s: %s, masks of %d of %d frames: %s", self._root, form.name, len(self._places), len(times), matches_text
         )
@@ -70,8 +86,9 @@ class MasksBackend:
         if self._source.lacks:
             lost = " and ".join(self._source.lacks)
             logger.info("%s: holds no %s: what the network said of them is lost", self._root, lost)
-        label_set = read_label_file(request.labels) if request.labels else None
         self._labels = _labels(self._source, label_set, str(self._root))
+        if not self._labels:
+            logger.info("%s: says no classes (classes.json would): every mask is an object", self._root)
         self._vocabulary = load_vocabulary()
         self._settings = request.parameters.score_threshold, request.parameters.small_object_pixels
         self._tally, self._last = Tally(), max(self._places)
@@ -107,7 +124,8 @@ class MasksBackend:
             if mask.category not in self._source.categories and mask.category not in self._labels:
                 raise BadInput(
                     f"{self._root}: nothing says what category {mask.category} is",
-                    hint="list it among the categories, in classes.json, or with its id in --labels FILE.toml",
+                    hint="list it among the categories or in classes.json, or all of them with their ids in "
+                    "--labels FILE.toml",
                 )
             if mask.category in self._labels:
                 segments.append((number, NamedSegment(self._labels[mask.category], mask.score)))
@@ -117,6 +135,8 @@ class MasksBackend:
         self._tally.overlapping += frame_masks.overlapping
         self._tally.frames += frame_masks.overlapping > 0
         self._tally.faint += frame_masks.faint
+        self._tally.empty += frame_masks.empty
+        self._tally.ignored_frames += frame_masks.ignored > 0
 
     def _report(self) -> None:
         if self._tally.overlapping:
@@ -135,6 +155,19 @@ class MasksBackend:
                 self._settings[0],
             )
 
+        if self._tally.empty:
+            logger.warning(
+                "%s: annotations without a mask (a box, a line, `segmentation: []`) or a pixel, left out: %d",
+                self._root,
+                self._tally.empty,
+            )
+        if self._tally.ignored_frames:
+            logger.info(
+                "%s: 255 (of 16 bits also 65535) is in no list of classes and was taken for no mask in %d frames",
+                self._root,
+                self._tally.ignored_frames,
+            )
+
 
 def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
     """Return the format of a folder and its masks. Raises BadInput when it is of none, or broken."""
@@ -146,13 +179,16 @@ def open_folder(listing: Listing) -> tuple[MaskFormat, MaskSource]:
         if source is not None:
             return form, source
     format_list = "; ".join(f"{form.name} ({form.summary})" for form in formats)
-    raise BadInput(f"{listing.root}: holds no masks that are read here", hint=f"formats: {format_list}")
+    raise BadInput(
+        f"{listing.root}: holds no masks that are read here ({kinds_of_files(listing)})",
+        hint=way_of(listing) or f"formats: {format_list}",
+    )
 
 
 def _labels(source: MaskSource, label_set: LabelSet | None, where: str) -> dict[int, Label]:
-    """Return number -> label. Where the folder names nothing, the ids of the given labels are its numbers."""
+    """Return number -> label."""
     if not source.categories:
-        return {label.id: label for label in label_set.labels if label.id is not None} if label_set else {}
+        return {}
     matched = match_labels(
         {number: category.name for number, category in source.categories.items()}, label_set, where=where
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from scenewright.schemas.errors import BadInput
@@ -21,18 +23,21 @@ def read_classes(listing: Listing) -> tuple[dict[int, Category], int]:
 
     `classes.json` is an object number -> name, a list of COCO categories, or `{"divisor": 1000, "classes": ...}`: then
     number 17003 is the fourth instance of class 17, as networks trained on Cityscapes write it. `classes.txt` has a
-    number and a name in each line. Raises BadInput for a broken one; without a file both are empty.
+    number and a name in each line, Roboflow's `_classes.csv` with a comma between them, labelme2voc's `class_names.txt`
+    the names alone, from 0. Raises BadInput for a broken one; without a file the table of `--labels` counts.
     """
     path = listing.class_file()
     if path is None:
-        return {}, 0
+        return {number: Category(name) for number, name in listing.numbered.items()}, 0
     where = str(path)
+    if path.suffix == ".csv":
+        lines = [line.replace(",", " ", 1) for line in lines_of(path)[1:]]
+        return categories_of(dict(_pair(line) for line in lines), where), 0
     if path.suffix == ".txt":
-        try:
-            lines = [line.split("#")[0].strip() for line in file_text(path, LARGEST_SETTINGS, hint=HINT).splitlines()]
-        except (OSError, ValueError) as error:
-            raise BadInput(f"{path}: cannot be read as text ({type(error).__name__})", hint=HINT) from None
-        return categories_of(dict(_pair(line) for line in lines if line), where), 0
+        lines = lines_of(path)
+        if path.name == "class_names.txt":
+            return categories_of({str(number): name for number, name in enumerate(lines)}, where), 0
+        return categories_of(dict(_pair(line) for line in lines), where), 0
     data = listing.json(path)
     divisor = 0
     if isinstance(data, dict) and "classes" in data:
@@ -41,6 +46,17 @@ def read_classes(listing: Listing) -> tuple[dict[int, Category], int]:
             raise BadInput(f"{path}: divisor {divisor} is no number of 0 or more", hint=HINT)
         data = data["classes"]
     return categories_of(data, where), divisor
+
+
+def lines_of(path: Path) -> list[str]:
+    """Return the lines of a text that say something; `#` begins a comment. Raises BadInput when it is no text."""
+    lines = [line.split("#")[0].strip() for line in file_text(path, LARGEST_SETTINGS, hint=HINT).splitlines()]
+    return [line for line in lines if line]
+
+
+def words_numbered(words: Iterable[str], taken: Mapping[int, Category]) -> dict[str, int]:
+    """Return word -> number, in the order of the words and after those that are `taken`."""
+    return {word: number for number, word in enumerate(sorted(set(words)), start=1 + max(taken, default=0))}
 
 
 def categories_of(data: Any, where: str) -> dict[int, Category]:

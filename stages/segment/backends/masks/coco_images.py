@@ -24,4 +24,11 @@ def picture_of(file_name: str, number: int | None, row: Any, pictures: dict[int,
     if number is not None and number in pictures and (pictures[number].name or not file_name):
         return pictures[number]
     time = entry(row, "timestamp", (int, float))
-    return Picture(stem_of(file_name), number, None if time is None else float(time))
+    size = entry(row, "width", int), entry(row, "height", int)
+    return Picture(
+        stem_of(file_name),
+        number,
+        None if time is None else float(time),
+        (size[0], size[1]) if size[0] and size[1] else None,
+        file_name,
+    )

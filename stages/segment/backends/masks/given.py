@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from scenewright.stages.segment.backends.masks.listing import Listing
+from scenewright.stages.segment.backends.masks.names import own_name
 
 MOST_PIXELS = 2**30
 """Pixels of all masks of one frame together: 3495 masks of 640x480."""
@@ -32,6 +33,10 @@ class Picture:
     number: int | None = None
     time: float | None = None
     """[s]"""
+    size: tuple[int, int] | None = None
+    """Width and height [pixels], where outlines are given."""
+    seen: str = ""
+    """What the folder calls it, where that is not the name."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,10 @@ class GivenFrame:
     """Masks that lost pixels to others, or all of them."""
     faint: int = 0
     """Masks under the score threshold."""
+    empty: int = 0
+    """Annotations without a mask, or with one that has no pixel."""
+    ignored: int = 0
+    """Pixels of the value that means "ignore" by habit."""
 
 
 @dataclass(frozen=True)
@@ -97,5 +106,11 @@ def entry(row: Any, key: str, kind: type | tuple[type, ...]) -> Any:
 
 
 def stem_of(name: str) -> str:
-    """Return the last part of a path without its ending."""
-    return Path(name.replace("\\", "/")).stem
+    """Return the last part of a path without its ending, and without what a labelling service put behind it."""
+    return own_name(Path(name.replace("\\", "/")).stem)
+
+
+def picture_of_file(file: Path, root: Path, **more: Any) -> Picture:
+    """Return the picture that a file of the folder `root` is named after."""
+    seen = file.relative_to(root).as_posix() if file.is_relative_to(root) and file != root else file.name
+    return Picture(stem_of(file.name), seen=seen, **more)

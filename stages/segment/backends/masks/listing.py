@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,16 +14,20 @@ LARGEST_JSON = 512 * 2**20
 """Most bytes of a JSON file."""
 MOST_FILES = 200_000
 """Most files of a folder of masks; a guard, by eye."""
-CLASS_FILES = ("classes.json", "classes.txt")
-"""Files that say which number is which class; no masks."""
+CLASS_FILES = ("classes.json", "classes.txt", "class_names.txt", "_classes.csv")
+"""Files that say which number is which class; no masks. The last two are labelme2voc's and Roboflow's."""
 HINT = "docs/MASKS.md lists what is read"
 
 
 class Listing:
-    """The files of a folder (hidden ones left out), or one file. Raises BadInput when there is none."""
+    """The files of a folder (hidden ones left out), or one file. Raises BadInput when there is none.
 
-    def __init__(self, root: Path) -> None:
+    `numbered`, number -> name, says what numbers mean where no class file does: the table of `--labels`.
+    """
+
+    def __init__(self, root: Path, numbered: Mapping[int, str] | None = None) -> None:
         self.root = Path(root)
+        self.numbered = dict(numbered or {})
         self.files: list[Path] = [self.root] if self.root.is_file() else []
         for file in self.root.rglob("*") if self.root.is_dir() else ():
             if file.is_file() and not any(part.startswith(".") for part in file.relative_to(self.root).parts):
@@ -40,7 +45,16 @@ class Listing:
 
     def class_file(self) -> Path | None:
         """Return the class file of the folder, if there is one."""
-        return next((file for name in CLASS_FILES for file in self.files if file.name == name), None)
+        return self.named(*CLASS_FILES)
+
+    def named(self, *names: str) -> Path | None:
+        """Return the first file of one of these names, if there is one."""
+        return next((file for name in names for file in self.files if file.name == name), None)
+
+    def class_source(self) -> str:
+        """Return, for messages, what says which number is which class."""
+        path = self.class_file()
+        return path.name if path else "--labels"
 
     def json(self, path: Path) -> Any:
         """Return what a JSON file holds; it is kept."""

@@ -13,7 +13,7 @@ Trees = tuple[np.ndarray, np.ndarray, np.ndarray, float]
 """Feature of every inner node (T, 2^d - 1) int32, its threshold (T, 2^d - 1) float32 (above goes right), value of every
 leaf (T, 2^d) float32, and the score of no tree at all."""
 FORMAT = "scenewright boosted trees"
-_OTHER = "give a file that `scenewright train tabletop-pairs` wrote"
+_OTHER = "put the file of the project back, or write it anew: scenewright train tabletop-pairs with --ship"
 
 
 @compiled

@@ -11,15 +11,19 @@ from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
 from scenewright.stages.kit.formats.frames import Frame
 from scenewright.stages.kit.labels import LabelMap, LabelSet, load_label_set, match_labels, read_label_file
 from scenewright.stages.segment.backends.onnx import decoding
-from scenewright.stages.segment.backends.onnx.network import HINT, Network, fit
-from scenewright.stages.segment.backends.onnx.sidecar import read_sidecar
+from scenewright.stages.segment.backends.onnx.network import HINT, Network
+from scenewright.stages.segment.backends.onnx.sidecar import OBJECTNESS, read_sidecar
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
 from scenewright.stages.segment.naming import InstanceMask, NamedSegment, name_instances, name_segments
 from scenewright.stages.segment.panoptic import PanopticFrame
 
-SETS_BY_SIZE = {80: "coco-80", 133: "coco-panoptic", 150: "ade20k"}
+COCO_IDS = 91
+"""Classes of a network that gives out COCO's own ids, which have gaps."""
+SETS_BY_SIZE = {80: "coco-80", COCO_IDS: "coco-80", 133: "coco-panoptic", 150: "ade20k"}
 """Number of classes -> label set of published networks, in its order."""
+RAW_YOLO = {"yolo-seg": decoding.yolo_seg, "yolo-objectness": decoding.yolo_objectness}
+"""Layout -> what reads it: boxes that are not suppressed yet."""
 
 logger = logging.getLogger("scenewright")
 
@@ -61,7 +65,7 @@ class OnnxBackend:
             return PanopticFrame(np.zeros(geometric.labels.shape, dtype=np.int32))
         shape = (frame.color.shape[0], frame.color.shape[1])
         least = pixels_at(self._minimum, shape)
-        fitted = fit(frame.color, self._network.sidecar, self._network.size)
+        fitted = self._network.fit(frame.color)
         outputs = self._network(fitted)
         if self._network.sidecar.layout == "panoptic":
             ids, segments = decoding.panoptic(
@@ -78,8 +82,8 @@ class OnnxBackend:
                 if number in self._labels.labels
             }
             return name_segments(ids, named_segments, self._vocabulary, minimum_pixels=least)
-        if self._network.sidecar.layout == "yolo-seg":
-            things = decoding.yolo_seg(
+        if self._network.sidecar.layout in RAW_YOLO:
+            things = RAW_YOLO[self._network.sidecar.layout](
                 outputs["predictions"],
                 outputs["prototypes"],
                 fitted,
@@ -87,11 +91,19 @@ class OnnxBackend:
                 score_threshold=self._threshold,
                 suppression_overlap=self._overlap,
             )
+        elif self._network.sidecar.layout == "yolo-end-to-end":
+            things = decoding.yolo_end_to_end(
+                outputs["predictions"], outputs["prototypes"], fitted, shape, score_threshold=self._threshold
+            )
+        elif self._network.sidecar.layout == "query-instances":
+            things = decoding.query_instances(
+                outputs["classes"], outputs["masks"], fitted, shape, score_threshold=self._threshold
+            )
         else:
             things = decoding.instances(
                 outputs["boxes"],
                 outputs["labels"],
-                outputs["scores"],
+                outputs.get("scores"),
                 outputs["masks"],
                 fitted,
                 shape,
@@ -109,17 +121,27 @@ def _label_map(network: Network, label_set: LabelSet | None) -> LabelMap:
     """Return what the network's numbers stand for: by its metadata, its sidecar, or the number of its classes."""
     sidecar, name = network.sidecar, network.path.name
     if isinstance(sidecar.labels, tuple):
+        named, given = len(sidecar.labels), class_count(network)
+        if given is not None and named != given:
+            logger.warning("%s: has %d classes, `labels` of the sidecar name %d; others stay void", name, given, named)
         return _warn_of_unknown(match_labels(dict(enumerate(sidecar.labels)), label_set, where=name), name)
-    if not sidecar.labels and (names := network.names()):
+    if (network.is_guessed or not sidecar.labels) and (names := network.names()):
         return _warn_of_unknown(match_labels(names, label_set, where=name), name)
     count = class_count(network)
     set_name = sidecar.labels or SETS_BY_SIZE.get(count or 0, "")
     if not set_name:
-        raise BadInput(f"{name}: nothing says what its {count} classes are", hint=f"{HINT}: labels = [...]")
+        classes = "classes" if count is None else f"{count} classes"
+        outputs = ", ".join(f'{role} = "{output}"' for role, output in sidecar.outputs.items())
+        raise BadInput(
+            f"{name}: nothing says what its {classes} are",
+            hint=f'--sidecar FILE.toml with layout = "{sidecar.layout}", labels = ["chair", ...], '
+            f"outputs = {{ {outputs} }}",
+        )
     labels = load_label_set(set_name)
-    if not sidecar.labels:
-        logger.info("%s: %d classes, taken for %s in its order", name, count, set_name)
-    if sidecar.numbering == "id":
+    if network.is_guessed or not sidecar.labels:
+        known = "its outputs name no classes" if count is None else f"{count} classes"
+        logger.info("%s: %s, taken for those of %s (`labels` in --sidecar says others)", name, known, set_name)
+    if sidecar.numbering == "id" or count == COCO_IDS:
         names = {label.id: label.name for label in labels.labels if label.id is not None}
     else:
         if count is not None and count != len(labels.labels):
@@ -132,8 +154,12 @@ def class_count(network: Network) -> int | None:
     """Return how many classes the shapes of the outputs tell of; None when they do not."""
     if network.sidecar.layout == "panoptic":
         return network.shapes["classes"][2] - 1
+    if network.sidecar.layout == "query-instances":
+        return network.shapes["classes"][2]
     if network.sidecar.layout == "yolo-seg":
         return network.shapes["predictions"][1] - 4 - network.shapes["prototypes"][1]
+    if network.sidecar.layout == "yolo-objectness":
+        return network.shapes["predictions"][2] - OBJECTNESS - network.shapes["prototypes"][1]
     return None
 
 

@@ -1,13 +1,15 @@
-"""From the outputs of the three known layouts to masks of the image. Arrays of networks are not trusted: what is not
+"""From the outputs of the known layouts to masks of the image. Arrays of networks are not trusted: what is not
 finite is dropped."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from scenewright.stages.segment.backends.onnx.network import Fitted
+from scenewright.stages.segment.backends.onnx.sidecar import END_TO_END, OBJECTNESS
 from scenewright.stages.segment.suppression import suppress
 
 MOST_CANDIDATES = 300
@@ -51,21 +53,87 @@ def yolo_seg(
     half = np.maximum(rows[order, 2:4], 0) / 2
     boxes = np.concatenate([rows[order, :2] - half, rows[order, :2] + half], axis=1)
     unsuppressed = suppress(boxes, best[order], numbers[order], suppression_overlap)
-    input_height, input_width = fitted.tensor.shape[-2:]
+    chosen = order[unsuppressed]
+    masks = _masks_of_coefficients(rows[chosen, -count:], prototypes, boxes[unsuppressed], fitted, shape)
+    return [Found(mask, int(numbers[k]), _unit(best[k])) for mask, k in zip(masks, chosen, strict=True)]
+
+
+def yolo_objectness(
+    predictions: np.ndarray,
+    prototypes: np.ndarray,
+    fitted: Fitted,
+    shape: tuple[int, int],
+    *,
+    score_threshold: float,
+    suppression_overlap: float,
+) -> list[Found]:
+    """Return the instances of a YOLO segmentation network with objectness, as `yolo_seg` does.
+
+    `predictions` (1, N, 5 + C + M): centre x, y, width, height [input pixels], objectness 0..1, a score 0..1 per
+    class, M mask coefficients. A score is objectness times that of the class, as in YOLOv5.
+    """
+    boxes, sure, scores, coefficients = np.split(
+        predictions[0].astype(np.float32), [4, OBJECTNESS, predictions.shape[2] - prototypes.shape[1]], axis=1
+    )
+    rows = np.concatenate([boxes, sure * scores, coefficients], axis=1)
+    return yolo_seg(
+        rows.T[None],
+        prototypes,
+        fitted,
+        shape,
+        score_threshold=score_threshold,
+        suppression_overlap=suppression_overlap,
+    )
+
+
+def yolo_end_to_end(
+    predictions: np.ndarray, prototypes: np.ndarray, fitted: Fitted, shape: tuple[int, int], *, score_threshold: float
+) -> list[Found]:
+    """Return the instances of a YOLO segmentation network that suppresses doubles itself, in an image of `shape`.
+
+    `predictions` (1, N, 6 + M): x0, y0, x1, y1 [input pixels], score, number of the class, M mask coefficients;
+    `prototypes` (1, M, h, w).
+    """
+    rows = predictions[0].astype(np.float32)
+    sound = np.isfinite(rows).all(axis=1) & (rows[:, 4] >= score_threshold)
+    rows = rows[sound][np.argsort(-rows[sound, 4], kind="stable")][:MOST_CANDIDATES]
+    masks = _masks_of_coefficients(rows[:, END_TO_END:], prototypes, rows[:, :4], fitted, shape)
+    return [Found(mask, int(row[5]), _unit(row[4])) for mask, row in zip(masks, rows, strict=True)]
+
+
+def _masks_of_coefficients(
+    coefficients: np.ndarray, prototypes: np.ndarray, boxes: np.ndarray, fitted: Fitted, shape: tuple[int, int]
+) -> Iterator[np.ndarray]:
+    """Yield the masks (H, W) bool of coefficients (N, M) times prototypes (1, M, h, w), cut by boxes (N, 4)."""
+    height, width = fitted.tensor.shape[-2:]
+    for row, box in zip(coefficients, boxes, strict=True):
+        logits = np.tensordot(row, prototypes[0].astype(np.float32), axes=1)
+        input_logits = cv2.resize(logits, (width, height), interpolation=cv2.INTER_LINEAR)
+        yield (_to_image(input_logits, fitted, shape) > 0) & _inside(*_scaled_box(box, fitted), shape)
+
+
+def query_instances(
+    classes: np.ndarray, masks: np.ndarray, fitted: Fitted, shape: tuple[int, int], *, score_threshold: float
+) -> list[Found]:
+    """Return the instances of a network of queries that says of each class whether it is one (RF-DETR).
+
+    `classes` (1, Q, C) logits, each for itself; `masks` (1, Q, h, w) logits. A query is of its likeliest class.
+    """
+    scores = _sigmoid(np.nan_to_num(classes[0].astype(np.float64), nan=-50))
+    numbers, best = scores.argmax(axis=1), scores.max(axis=1)
+    order = np.argsort(-best, kind="stable")[:MOST_CANDIDATES]
+    height, width = fitted.tensor.shape[-2:]
     things = []
-    for k in unsuppressed:
-        logits = np.tensordot(rows[order[k], -count:], prototypes[0].astype(np.float32), axes=1)
-        input_logits = cv2.resize(logits, (input_width, input_height), interpolation=cv2.INTER_LINEAR)
-        mask = _to_image(input_logits, fitted, shape) > 0
-        x0, y0, x1, y1 = _scaled_box(boxes[k], fitted)
-        things.append(Found(mask & _inside(x0, y0, x1, y1, shape), int(numbers[order[k]]), _unit(best[order[k]])))
+    for k in order[best[order] >= score_threshold]:
+        logits = cv2.resize(np.nan_to_num(masks[0, k].astype(np.float32), nan=-50), (width, height))
+        things.append(Found(_to_image(logits, fitted, shape) > 0, int(numbers[k]), _unit(best[k])))
     return things
 
 
 def instances(
     boxes: np.ndarray,
     labels: np.ndarray,
-    scores: np.ndarray,
+    scores: np.ndarray | None,
     masks: np.ndarray,
     fitted: Fitted,
     shape: tuple[int, int],
@@ -74,10 +142,13 @@ def instances(
 ) -> list[Found]:
     """Return the instances of a Mask R-CNN in an image of `shape` (H, W).
 
-    `boxes` (N, 4) x0, y0, x1, y1 [input pixels], `labels` (N,), `scores` (N,), `masks` (N, [1,] h, w) 0..1: of the size
-    of the input, or small ones that fill their box. A leading batch axis of 1 is passed over.
+    `boxes` (N, 4) x0, y0, x1, y1 [input pixels], `labels` (N,), `scores` (N,) or a fifth column of the boxes, `masks`
+    (N, [1,] h, w) 0..1: of the size of the input, or small ones that fill their box. A leading batch axis of 1 is
+    passed over.
     """
-    boxes, labels, scores = boxes.reshape(-1, 4), labels.reshape(-1), scores.reshape(-1)
+    boxes = boxes.reshape(-1, boxes.shape[-1]).astype(np.float32)
+    scores = boxes[:, 4] if scores is None else scores.reshape(-1)
+    boxes, labels = boxes[:, :4], labels.reshape(-1)
     masks = masks.reshape(-1, *masks.shape[-2:]).astype(np.float32)
     if not len(boxes) == len(labels) == len(scores) == len(masks):
         return []

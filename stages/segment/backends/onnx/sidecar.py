@@ -4,22 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import ValidationError
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, first_problem
 from scenewright.schemas.outside import file_toml
 
-Layout = Literal["yolo-seg", "instances", "panoptic"]
+Layout = Literal["yolo-seg", "yolo-objectness", "yolo-end-to-end", "instances", "query-instances", "panoptic"]
 LARGEST_FILE = 2**20
 """Most bytes of a sidecar."""
+END_TO_END = 6
+"""Columns of an end-to-end prediction before its coefficients: corners of the box, score, class."""
+OBJECTNESS = 5
+"""Columns of a prediction with objectness before its classes: the box, and how sure it is that there is a thing."""
+MOST_END_TO_END = 1000
+"""Most rows that an end-to-end export is taken to give (its usual `max_det` is 300). With one class and objectness
+rows are as long, and there are thousands of them."""
 OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "yolo-seg": ("predictions", "prototypes"),
+    "yolo-objectness": ("predictions", "prototypes"),
+    "yolo-end-to-end": ("predictions", "prototypes"),
     "instances": ("boxes", "labels", "scores", "masks"),
+    "query-instances": ("classes", "masks"),
     "panoptic": ("classes", "masks"),
 }
-"""Layout -> roles of its outputs."""
+"""Layout -> roles of its outputs. `instances` needs no `scores` where boxes have them as a fifth column."""
+SHAPES: Mapping[str, str] = {
+    "yolo-seg": "predictions (1, 4+C+M, N), prototypes (1, M, h, w)",
+    "yolo-objectness": "predictions (1, N, 5+C+M), prototypes (1, M, h, w)",
+    "yolo-end-to-end": "predictions (1, N, 6+M), prototypes (1, M, h, w)",
+    "instances": "boxes (N, 4 or 5), labels (N,), scores (N,), masks (N, [1,] h, w)",
+    "query-instances": "classes (1, Q, C), masks (1, Q, h, w)",
+    "panoptic": "classes (1, Q, C+1), masks (1, Q, h, w)",
+}
+"""Layout -> what its outputs look like, for messages."""
 KNOWN_NAMES = {
     "boxes": "boxes",
     "labels": "labels",
@@ -60,18 +79,29 @@ IMAGENET_MEAN, IMAGENET_DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Mean and standard deviation of ImageNet's pictures (R, G, B of 0..1), by which most networks were trained."""
 
 
+INPUTS: Mapping[str, Mapping[str, Any]] = {
+    "yolo-seg": {"resize": "letterbox"},
+    "yolo-objectness": {"resize": "letterbox"},
+    "yolo-end-to-end": {"resize": "letterbox"},
+    "query-instances": {"mean": IMAGENET_MEAN, "deviation": IMAGENET_DEVIATION},
+    "panoptic": {"mean": IMAGENET_MEAN, "deviation": IMAGENET_DEVIATION},
+}
+"""Layout -> what goes in, where a sidecar does not say it."""
+
+
 def read_sidecar(path: Path) -> Sidecar:
     """Read a TOML sidecar. Raises BadInput when it is none, or does not name the outputs of its layout."""
     hint = "see docs/SEGMENTATION.md"
     try:
         values = file_toml(path, LARGEST_FILE, hint=hint)
-        sidecar = Sidecar.model_validate({k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
+        told = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+        sidecar = Sidecar.model_validate({**INPUTS.get(str(told.get("layout")), {}), **told})
     except ValidationError as error:
         raise BadInput(f"{path}: {first_problem(error)}", hint=hint) from None
     except (ValueError, TypeError, RecursionError) as error:
         raise BadInput(f"{path}: {str(error).splitlines()[0]:.120}", hint=hint) from None
     roles = OUTPUTS[sidecar.layout]
-    if set(sidecar.outputs) != set(roles):
+    if set(sidecar.outputs) not in (set(roles), set(roles) - {"scores"}):
         raise BadInput(f"{path}: outputs are {sorted(sidecar.outputs)}, not {sorted(roles)}", hint=hint)
     if sidecar.size is not None and not all(0 < side <= 16384 for side in sidecar.size):
         raise BadInput(f"{path}: size {sidecar.size} is no image's", hint=hint)
@@ -80,11 +110,13 @@ def read_sidecar(path: Path) -> Sidecar:
     return sidecar
 
 
-def find_layout(shapes: Mapping[str, tuple[int, ...]]) -> Sidecar | None:
+def find_layout(shapes: Mapping[str, tuple[int, ...]], classes: int = 0) -> Sidecar | None:
     """Return how to use a network by the names and shapes of what it gave for one image; None when it is not known.
 
-    Known: YOLO segmentation (boxes, class scores and mask coefficients beside prototypes), Mask R-CNN of torchvision
-    and Detectron2 by their names, and queries with class logits and mask logits (Mask2Former and its kind).
+    `classes` is how many the file's metadata names, 0 for none. Known: YOLO segmentation, raw (boxes, class scores and
+    mask coefficients beside prototypes), with objectness (the same row by row, as YOLOv5 and YOLOv7 write it) and end
+    to end (boxes with score, class and coefficients), Mask R-CNN of torchvision, Detectron2 and MMDeploy and RF-DETR by
+    their names, and queries with class logits and mask logits (Mask2Former, DETR and their kind).
     """
     roles = {KNOWN_NAMES[name]: name for name in shapes if name in KNOWN_NAMES}
     if set(roles) == set(OUTPUTS["instances"]):
@@ -97,18 +129,64 @@ def find_layout(shapes: Mapping[str, tuple[int, ...]]) -> Sidecar | None:
             order="bgr" if detectron else "rgb",
             scale=1.0 if detectron else 1 / 255,
         )
+    if set(shapes) == {"dets", "labels", "masks"}:
+        if shapes["dets"][-1:] == (5,):  # MMDeploy, with the input of MMDetection's own configurations
+            mmdeploy = {"boxes": "dets", "labels": "labels", "masks": "masks"}
+            normal = INPUTS["panoptic"]
+            return Sidecar(layout="instances", outputs=mmdeploy, labels="coco-80", resize="letterbox", **normal)
+        if len(shapes["labels"]) == 3 and len(shapes["masks"]) == 4:
+            return _known("query-instances", classes="labels", masks="masks")
+    if {"logits", "pred_masks"} <= set(shapes) <= {"logits", "pred_masks", "pred_boxes"}:
+        return _known("panoptic", classes="logits", masks="pred_masks")
     flat = [name for name, shape in shapes.items() if len(shape) == 3]
     deep = [name for name, shape in shapes.items() if len(shape) == 4]
     if len(shapes) != 2 or len(flat) != 1 or len(deep) != 1:
         return None
     first, second = shapes[flat[0]], shapes[deep[0]]
     if first[1] == second[1]:
-        return Sidecar(
-            layout="panoptic",
-            outputs={"classes": flat[0], "masks": deep[0]},
-            mean=IMAGENET_MEAN,
-            deviation=IMAGENET_DEVIATION,
-        )
+        return _known("panoptic", classes=flat[0], masks=deep[0])
+    if first[2] == second[1] + END_TO_END and (first[1] <= MOST_END_TO_END or classes > 1):
+        return _known("yolo-end-to-end", predictions=flat[0], prototypes=deep[0])
+    scores = first[2] - second[1] - OBJECTNESS
+    if scores > 0 and (scores == classes or (not classes and first[1] > first[2])):
+        return _known("yolo-objectness", predictions=flat[0], prototypes=deep[0])
     if first[1] > 4 + second[1] and first[2] > first[1]:
-        return Sidecar(layout="yolo-seg", outputs={"predictions": flat[0], "prototypes": deep[0]}, resize="letterbox")
+        return _known("yolo-seg", predictions=flat[0], prototypes=deep[0])
     return None
+
+
+def _known(layout: Layout, **outputs: str) -> Sidecar:
+    return Sidecar(layout=layout, outputs=outputs, **INPUTS[layout])
+
+
+def misfit(layout: str, shapes: Mapping[str, tuple[int, ...]]) -> str:
+    """Return what is wrong with the shapes of a layout's outputs, by role; empty: nothing that can be seen."""
+    if layout == "yolo-objectness":
+        first, second = shapes["predictions"], shapes["prototypes"]
+        if len(first) == 3 and len(second) == 4 and first[2] > second[1] + OBJECTNESS:
+            return ""
+    elif layout in ("yolo-seg", "yolo-end-to-end"):
+        first, second = shapes["predictions"], shapes["prototypes"]
+        if len(first) == 3 and len(second) == 4:
+            end_to_end = first[2] == second[1] + END_TO_END
+            if end_to_end != (layout == "yolo-end-to-end"):
+                other = "yolo-end-to-end" if end_to_end else "yolo-seg"
+                return f"these are the shapes of {other}"
+            if end_to_end or first[1] > 4 + second[1]:
+                return ""
+    elif layout == "instances":
+        if shapes["boxes"][-1:] == ((4,) if "scores" in shapes else (5,)):
+            return ""
+    elif len(shapes["classes"]) == 3 and len(shapes["masks"]) == 4 and shapes["classes"][1] == shapes["masks"][1]:
+        return ""
+    return f"{layout} has {SHAPES[layout]}"
+
+
+def only_boxes(shapes: Mapping[str, tuple[int, ...]]) -> bool:
+    """Return whether the outputs of one image are those of a detector: boxes, no masks."""
+    if len(shapes) == 1:
+        (shape,) = shapes.values()
+        return len(shape) in (2, 3) and min(shape[-2:]) >= 5
+    return all(len(shape) <= 3 for shape in shapes.values()) and any(
+        shape[-1:] in ((4,), (5,)) for shape in shapes.values()
+    )

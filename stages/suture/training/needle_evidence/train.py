@@ -143,7 +143,9 @@ def train(options: EvidenceTraining, out: Path) -> None:
     lines = [json.loads(line) for line in kept.read_text().splitlines()]
     samples = [sample_of(line) for line in lines if any(line["right"]) and not all(line["right"])]
     if not samples:
-        raise BadInput(f"{kept}: no view in which some rivals are right and some wrong", hint="without --quick")
+        raise BadInput(
+            f"{kept}: no view in which some rivals are right and some wrong", hint="leave --quick out: more views"
+        )
     told = []
     for ridge in (None, *RIDGES):
         surprises = left_out(samples, ridge)

@@ -10,12 +10,11 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.preflight.calibration import calibration_findings, calibration_report, other_size
 from scenewright.stages.ingest.preflight.charts import ticks
 from scenewright.stages.ingest.preflight.choice import RUN_LENGTH, choose, turn
-from scenewright.stages.ingest.preflight.depth import depth_findings, depth_report, plausible_factors, units_per_metre
+from scenewright.stages.ingest.preflight.depth import depth_findings, depth_report, units_per_metre
 from scenewright.stages.ingest.preflight.epipolar import Matches, epipolar_distances
 from scenewright.stages.ingest.preflight.fits import relative_pose
 from scenewright.stages.ingest.preflight.looking import Look, look_at_entry
 from scenewright.stages.ingest.preflight.pictures import sharpness
-from scenewright.stages.ingest.preflight.pose_findings import depth_is_blamed
 from scenewright.stages.ingest.preflight.poses import round_scale
 from scenewright.stages.ingest.preflight.registration import Edges, best_offset, lag_scores
 from scenewright.stages.ingest.preflight.steps import step_reports
@@ -142,20 +141,13 @@ def test_eight_bit_depth_and_cut_off() -> None:
     assert any("exactly 4.000 m" in f.message and "--maximum-depth" in f.fix for f in found)
 
 
-def test_factors_that_make_depth_plausible() -> None:
-    assert plausible_factors(20.0)[0] == 0.2 and 0.1 in plausible_factors(20.0)
-    assert plausible_factors(0.002) == [1000.0]
-    assert plausible_factors(2000.0) == [0.001]
+def test_where_the_unit_of_depth_is_from() -> None:
     assert units_per_metre(("depth unit assumed: 1/5000 m",), None) == 5000
     assert units_per_metre(("depth unit assumed: 1/5000 m",), 200.0) == 200
     assert units_per_metre((), None) == 1000
 
 
-def test_who_is_to_blame_for_a_scale() -> None:
-    assert depth_is_blamed(5.0, 2.0) and depth_is_blamed(0.2, 2.0)  # only depth images are divided by 5000
-    assert depth_is_blamed(0.001, 2.0) is False  # a room of 2 m is a room: the poses are in millimetres
-    assert depth_is_blamed(10.0, 20.0)  # 20 m is none, 2 m is
-    assert depth_is_blamed(10.0, 9000.0) is None
+def test_measured_scales_are_those_of_units() -> None:
     assert round_scale(0.0985) == 0.1 and round_scale(4.9) == 5.0 and round_scale(0.37) == 0.37
 
 

@@ -45,7 +45,8 @@ def open_source(listing: Listing) -> MaskSource | None:
         if not exact:
             raise BadInput(f"{where}: its image {name!r:.80} is not in {listing.root}", hint="put the PNGs beside it")
         images.append(exact[0])
-    categories = categories_of(data["categories"], where) if "categories" in data else read_classes(listing)[0]
+    own = categories_of(data["categories"], where) if "categories" in data else {}
+    categories = read_classes(listing)[0] | own
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
         ids = read_panoptic(images[place], shape)

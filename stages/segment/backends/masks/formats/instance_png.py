@@ -1,28 +1,29 @@
-"""PNGs of one channel, 8 or 16 bits, one a picture: the value of a pixel is the instance it is of, 0 none.
+"""PNGs of one channel or with a palette, one a picture: the value (the index) of a pixel is the instance it is of.
 
 What a value is, says the class file of the folder (`classes.json`, `classes.txt`) or, for one picture and before it,
-a JSON of the picture's name: `{"7": "chair", "9": {"class": "wall", "score": 0.8}}`.
+a JSON of the picture's name: `{"7": "chair", "9": {"class": "wall", "score": 0.8}}`. 0 is no mask where neither
+lists it.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.segment.backends.masks.classes import read_classes, score_of
+from scenewright.stages.segment.backends.masks.classes import read_classes, score_of, words_numbered
 from scenewright.stages.segment.backends.masks.given import (
     Category,
     GivenFrame,
     GivenMask,
     MaskFormat,
     MaskSource,
-    Picture,
     ReadSettings,
+    picture_of_file,
 )
 from scenewright.stages.segment.backends.masks.images import read_instances
 from scenewright.stages.segment.backends.masks.listing import Listing
+from scenewright.stages.segment.backends.masks.values import IGNORED, check_listed, named_by_value, numbered
 
 HINT = 'classes.json: {"1": "chair"}, or beside 000012.png a 000012.json: {"7": {"class": "chair", "score": 0.8}}'
 
@@ -38,42 +39,35 @@ def open_source(listing: Listing) -> MaskSource | None:
         for file in files
     ]
     classes, divisor = read_classes(listing)
-    words = sorted({word for entries in entries_by_file for word, _ in (entries or {}).values() if word})
-    numbers = {word: number for number, word in enumerate(words, start=1 + max(classes, default=0))}
+    class_file = listing.class_source()
+    numbers = words_numbered(
+        (word for entries in entries_by_file for word, _ in (entries or {}).values() if word), classes
+    )
     categories = {**classes, **{number: Category(word) for word, number in numbers.items()}}
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
-        ids = read_instances(files[place], shape)
-        values = [value for value in np.unique(ids).tolist() if value]
+        values, has_palette = read_instances(files[place], shape)
         entries = entries_by_file[place]
-        if entries is not None:
-            missing = [value for value in values if value not in entries]
-            source = beside[files[place].with_suffix("")].name
-            masks = {v: GivenMask(numbers.get(entries[v][0]), entries[v][1]) for v in values if v in entries}
-        else:
-            of = {value: value // divisor if divisor and value >= divisor else value for value in values}
-            missing = [value for value in values if classes and of[value] not in classes]
-            source = getattr(listing.class_file(), "name", "")
-            masks = {value: GivenMask(of[value] if classes else None) for value in values if value not in missing}
-        if missing:
-            raise BadInput(
-                f"{files[place]}: id {missing[0]} is beyond {source}, which lists {_range(entries or classes)} "
-                f"({len(missing)} such ids)",
-                hint=HINT,
-            )
-        return GivenFrame(ids, masks)
+        if entries is None and classes:
+            return named_by_value(values, classes, divisor, files[place], class_file, HINT)
+        present = np.unique(values).tolist()
+        if entries is None:
+            # PASCAL VOC and its kin draw a rim of 255 around the instances of a palette.
+            ignored = [v for v in present if v in IGNORED and has_palette and len(set(present) - {0, v})]
+            return numbered(values, {v: GivenMask(None) for v in present if v and v not in ignored}, ignored)
+        unlisted = [value for value in present if value not in entries]
+        missing = [value for value in unlisted if value and value not in IGNORED]
+        check_listed(missing, entries, files[place], beside[files[place].with_suffix("")].name, HINT)
+        masks = {v: GivenMask(numbers.get(entries[v][0]), entries[v][1]) for v in present if v in entries}
+        return numbered(values, masks, [value for value in unlisted if value in IGNORED])
 
     scored = any(entries is not None for entries in entries_by_file)
     return MaskSource(
-        tuple(Picture(file.stem) for file in files),
+        tuple(picture_of_file(file, listing.root) for file in files),
         categories,
         read,
         ("overlaps",) if scored else ("scores", "overlaps"),
     )
-
-
-def _range(listed: Any) -> str:
-    return f"{min(listed)}..{max(listed)}" if listed else "none"
 
 
 def _read_entries(listing: Listing, path: Path) -> dict[int, tuple[str, float]]:
@@ -91,5 +85,5 @@ def _read_entries(listing: Listing, path: Path) -> dict[int, tuple[str, float]]:
 
 
 FORMAT = MaskFormat(
-    "instance PNG", "8 or 16 bits, with classes.json, classes.txt or a JSON beside each", 50, open_source
+    "instance PNG", "8 or 16 bits or a palette, with classes.json, classes.txt or a JSON beside each", 50, open_source
 )

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.segment.backends.masks.coco_images import picture_of
 from scenewright.stages.segment.backends.masks.encoded import flatten_encoded
 from scenewright.stages.segment.backends.masks.given import (
     GivenFrame,
@@ -18,6 +17,7 @@ from scenewright.stages.segment.backends.masks.given import (
     MaskSource,
     ReadSettings,
     entry,
+    picture_of_file,
 )
 from scenewright.stages.segment.backends.masks.listing import Listing, read_json
 
@@ -40,7 +40,7 @@ def open_source(listing: Listing) -> MaskSource | None:
         masks = [GivenMask(None, _score(row, where)) for row in rows]
         return flatten_encoded([row.get("segmentation") for row in rows], masks, settings, shape, where)
 
-    return MaskSource(tuple(picture_of(file.name, None, {}, {}) for file in files), {}, read)
+    return MaskSource(tuple(picture_of_file(file, listing.root) for file in files), {}, read)
 
 
 def _rows(data: Any) -> list[Any] | None:

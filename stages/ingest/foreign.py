@@ -1,0 +1,190 @@
+"""Recordings of other tools that no layout reads: recognised by name, with the way to something that is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
+from scenewright.stages.ingest.folders.calibration_search import calibration_file
+from scenewright.stages.ingest.folders.files import read_json
+from scenewright.stages.ingest.folders.pose_files import pose_file
+
+HEAD = 4_000_000
+"""Bytes of a file in which the words of a tool are looked for."""
+SHOWN = 5
+"""Most files that a message names."""
+TABLES = (".json", ".csv", ".yaml", ".yml", ".xml", ".ini", ".toml", ".cfg")
+THEN = ", then ingest OUT"
+UNPACK = "unpack it into a folder and give that folder"
+MESH = "it is a mesh or points, no recording: scenewright fuse --from-mesh takes a PLY"
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """A recording that was recognised."""
+
+    name: str
+    way: str
+    """What to do; `{}` stands for the recording."""
+
+
+AZURE_KINECT = Foreign(
+    "an Azure Kinect recording",
+    f"take its images out with Open3D: python azure_kinect_mkv_reader.py --input {{}} --output OUT{THEN}",
+)
+VIDEO = Foreign("a video", "put it into a folder of its own with a calibration file (docs/LOGS.md), and give that")
+RECORD3D = Foreign(
+    "a Record3D recording",
+    f"export it as EXR + JPG sequence in the app, ns-process-data record3d --data FOLDER --output-dir OUT{THEN}",
+)
+RTABMAP = Foreign(
+    "an RTAB-Map database",
+    "write its images with rtabmap-export --images {} and its poses with rtabmap-export --poses_camera "
+    "--poses_format 10 {}; give ingest the folder, and the poses as --trajectory",
+)
+BY_ENDING = {
+    ".mkv": VIDEO,
+    **dict.fromkeys((".mp4", ".mov", ".avi", ".webm"), VIDEO),
+    ".r3d": RECORD3D,
+    **dict.fromkeys(
+        (".svo", ".svo2"),
+        Foreign(
+            "a ZED recording",
+            "write left pictures and depth with the ZED SDK: python export_svo.py --mode 4 --input_svo_file {} "
+            "--output_path_dir OUT, then ingest OUT with its --fx --fy --cx --cy",
+        ),
+    ),
+    ".db": RTABMAP,
+    ".oni": Foreign(
+        "an OpenNI recording", "play it with OpenNI2 and write colour and 16-bit depth as PNG into color/ and depth/"
+    ),
+    ".klg": Foreign(
+        "a log of Kintinuous or ElasticFusion", "write its colour and 16-bit depth as PNG into color/ and depth/"
+    ),
+    ".usdz": Foreign("a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh"),
+    ".vrs": Foreign(
+        "a Project Aria recording", f"ns-process-data aria --vrs-file {{}} --output-dir OUT (nerfstudio){THEN}"
+    ),
+    ".rrd": Foreign("a Rerun recording", "record the same streams as MCAP (docs/LOGS.md)"),
+    **dict.fromkeys(
+        (".h5", ".hdf5", ".parquet"),
+        Foreign("a table of arrays", "write its pictures as a folder of images (docs/LOGS.md) and give that folder"),
+    ),
+    ".tum": Foreign("a trajectory, no recording", "give its log, and it beside: ingest --log FOLDER --trajectory {}"),
+    **dict.fromkeys((".zip", ".tar", ".gz", ".tgz", ".7z", ".rar", ".xz"), Foreign("an archive", UNPACK)),
+    **dict.fromkeys((".ply", ".obj", ".glb", ".gltf", ".stl", ".pcd", ".las", ".e57"), Foreign("a scan", MESH)),
+}
+
+
+def refuse_foreign_file(path: Path) -> None:
+    """Raise BadInput for a file of another tool, told apart by its ending, or by its words."""
+    ending = path.suffix.lower()
+    if ending not in BY_ENDING:
+        return
+    found = BY_ENDING[ending]
+    if ending == ".mkv" and b"K4A_" in _head(path):
+        found = AZURE_KINECT
+    if ending == ".db" and b"messages" in (head := _head(path)) and b"topics" in head:
+        return  # a ROS 2 bag under another name
+    _refuse(path, found)
+
+
+def refuse_foreign_folder(root: Path) -> None:
+    """Raise BadInput for a folder as another tool wrote it; one with a calibration or poses is meant to be read."""
+    if calibration_file(root) is not None or pose_file(root) is not None:
+        return
+    for found, is_one in FOLDERS:
+        if is_one(root):
+            _refuse(root, found)
+
+
+def refuse_lone_recording(root: Path) -> None:
+    """Raise BadInput for a folder in which nothing is read, but in which a file of another tool lies."""
+    for path in sorted(root.iterdir()):
+        if path.is_file():
+            refuse_foreign_file(path)
+
+
+def unread_tables(root: Path, read: tuple[str, ...]) -> str:
+    """Return the files of tables and settings in a folder, without those `read`: they may say what is missing."""
+    names = sorted(p.name for p in root.iterdir() if p.suffix.lower() in TABLES and p.name not in read)
+    return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} files)" if len(names) > SHOWN else "")
+
+
+def _refuse(path: Path, found: Foreign) -> None:
+    raise BadInput(f"{path}: is {found.name}, which is not read as it is", hint=found.way.replace("{}", str(path)))
+
+
+def _head(path: Path) -> bytes:
+    with opened(path) as file:
+        return file.read(HEAD)
+
+
+def _is_stray_scanner(root: Path) -> bool:
+    return (root / "camera_matrix.csv").is_file() and (root / "odometry.csv").is_file()
+
+
+def _is_record3d(root: Path) -> bool:
+    if (root / "EXR_RGBD").is_dir() or any(root.glob("rgbd/*.conf")):
+        return True
+    if not (root / "metadata.json").is_file():
+        return False
+    try:
+        document = read_json(root / "metadata.json")
+    except BadInput:
+        return False
+    return isinstance(document, dict) and {"K", "poses"} <= document.keys()
+
+
+def _is_polycam(root: Path) -> bool:
+    """Whether JSON files of cameras lie in it that state a pose number by number."""
+    folders = (folder / name for folder in (root / "keyframes", root) for name in ("cameras", "corrected_cameras"))
+    first = next((path for folder in folders for path in sorted(folder.glob("*.json"))), None)
+    return first is not None and b'"t_00"' in _head(first)
+
+
+def _is_scanner_app(root: Path) -> bool:
+    return (root / "frame_00000.jpg").is_file() and (root / "frame_00000.json").is_file()
+
+
+def _is_arkit_scenes(root: Path) -> bool:
+    return (root / "lowres_depth").is_dir() and any(root.glob("*.traj"))
+
+
+FOLDERS: tuple[tuple[Foreign, Callable[[Path], bool]], ...] = (
+    (
+        Foreign(
+            "a Stray Scanner recording",
+            "make a ROS bag of it: python create_rosbag.py {} --out OUT.bag (StrayVisualizer), then ingest OUT.bag",
+        ),
+        _is_stray_scanner,
+    ),
+    (
+        Foreign("a Record3D recording", f"ns-process-data record3d --data {{}} --output-dir OUT (nerfstudio){THEN}"),
+        _is_record3d,
+    ),
+    (
+        Foreign(
+            "a Polycam raw export",
+            f"ns-process-data polycam --data {{}} --output-dir OUT --use-depth (nerfstudio){THEN}",
+        ),
+        _is_polycam,
+    ),
+    (
+        Foreign(
+            "a recording of the 3D Scanner App",
+            "write its poses and intrinsics as transforms.json (docs/LOGS.md, layout nerfstudio)",
+        ),
+        _is_scanner_app,
+    ),
+    (
+        Foreign(
+            "a recording of ARKitScenes",
+            "write its poses and intrinsics as transforms.json (docs/LOGS.md, layout nerfstudio)",
+        ),
+        _is_arkit_scenes,
+    ),
+)
