@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +15,15 @@ from scenewright.stages.fuse.extraction import ExtractedEntity, ExtractionSettin
 from scenewright.stages.fuse.impossible_names import without_impossible_names
 from scenewright.stages.fuse.mapping import PanopticMapper
 from scenewright.stages.fuse.parameters import FuseParameters
-from scenewright.stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
+from scenewright.stages.fuse.layout.evidence import Scene
+from scenewright.stages.fuse.layout.room import find_layout
+from scenewright.stages.fuse.layout_entities import with_layout
+from scenewright.stages.fuse.piece_entities import Classes, with_pieces
 from scenewright.stages.fuse.smoothing import smoothed_tsdf
-from scenewright.stages.fuse.strange_places import share_told, sure_things, thing_score, without_names
+from scenewright.stages.fuse.strange_places import share_told
 from scenewright.stages.fuse.surface import Surface, extract_surface
 from scenewright.stages.kit.formats.map_files import mesh_name
+from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 from scenewright.stages.kit.stage import Progress
 
 FLAT_TOPPED = ("table", "desk")
@@ -68,6 +73,28 @@ def is_strange(source: MaskSource, parameters: FuseParameters) -> bool:
     return source.recognised is not None and source.recognised < parameters.least_recognised
 
 
+BOUNDS = ("floor", "wall", "ceiling")
+
+
+def bounds_of(vocabulary: Vocabulary) -> frozenset[int]:
+    """Return the classes of what bounds a room: geometry finds it, masks of these classes are votes."""
+    return frozenset(vocabulary.by_name(name).id for name in BOUNDS)
+
+
+def scene_of(surface: Surface, labels: np.ndarray, scores: Mapping[int, Mapping[int, float]], mapper: PanopticMapper, bounds: frozenset[int]) -> Scene:
+    """Return what layout is found in."""
+    vertices = surface.vertices.astype(float)
+    corners = vertices[surface.faces]
+    face_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    areas = np.bincount(surface.faces.ravel(), weights=np.repeat(face_area / 3, 3), minlength=len(vertices))
+    bounding, furniture = np.zeros(int(labels.max(initial=0)) + 1), np.zeros(int(labels.max(initial=0)) + 1)
+    for label in range(1, len(bounding)):
+        looks = max(1, mapper.sightings.get(label, 0))
+        for c, score in scores.get(label, {}).items():
+            (bounding if c in bounds else furniture)[label] += score / looks
+    return Scene(vertices, vertex_normals(vertices, surface.faces), areas, bounding[labels], furniture[labels], np.array(mapper.cameras).reshape(-1, 3), mapper.free_space)
+
+
 def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, progress: Progress) -> ClosedMap:
     """Merge what is one instance, draw the surface and cut it into entities.
 
@@ -97,19 +124,17 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
         entities, labelled = extract_entities(
             surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
         )
-        ours = parameters.merging == "ours"
-        strange = ours and is_strange(source, parameters)
         things, scores = mapper.merging.things, grouping.class_scores
-        flat_topped = frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED)
-        if strange:
-            score_of = {e.instance: thing_score(e.segments, scores, things, mapper.sightings) for e in entities}
-            sure = sure_things(entities, score_of, things - flat_topped)
-            entities, labelled = without_names(entities, labelled, score_of, things, unnamed)
-        elif ours:
+        if parameters.merging == "ours":
+            flat_topped = frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED)
+            bounds = bounds_of(vocabulary)
+            scene = scene_of(surface, merged[surface.segment], mapper.merging.class_scores.by_segment, mapper, bounds)
+            layout = find_layout(scene)
             entities, labelled = without_impossible_names(
                 entities, labelled, scores, mapper.sightings, vocabulary, unnamed
             )
-        if parameters.unnamed_area > 0 and ours:
+            told = share_told(labelled, scores, mapper.sightings)
+            entities, labelled = with_layout(surface, entities, labelled, layout, told, things, vocabulary)
             classes = Classes(
                 floor=vocabulary.by_name("floor").id,
                 wall=vocabulary.by_name("wall").id,
@@ -119,12 +144,9 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
                 tables=flat_topped,
             )
             size = {"voxel": parameters.voxel_size, "minimum_area": parameters.unnamed_area}
-            if strange:
-                entities, labelled = by_geometry(surface, entities, labelled, classes, **size, sure=sure)
-            else:
-                name_scores = share_told(labelled, scores, mapper.sightings)
-                scores = without_claimed(scores, entities)
-                entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=name_scores)
+            scores = without_claimed(scores, entities)
+            if parameters.unnamed_area > 0:
+                entities, labelled = with_pieces(surface, entities, labelled, classes, scene, layout, told, **size)
             least = parameters.minimum_prediction_share
             entities, labelled = with_agreed_names(
                 entities, labelled, scores, mapper.sightings, vocabulary, unnamed, least

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.pieces import Cloud, pieces_beside
 from scenewright.stages.fuse.surface import Surface
 from scenewright.stages.fuse.unnamed_pieces import CEILING, FLOOR, topped_parts, unnamed_pieces
 from scenewright.stages.fuse.walls import of_walls
@@ -25,6 +26,17 @@ class Classes:
     things: frozenset[int] = frozenset()
     tables: frozenset[int] = frozenset()
     """Of things that are a level top on legs."""
+
+
+def with_pieces(surface, entities, labelled, classes, scene, layout, told, *, voxel, minimum_area):
+    vertices = scene.vertices - [0.0, 0.0, layout.floor or 0.0]
+    room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling)) | (layout.owner > 0) & (labelled.class_id == 0)
+    thing = np.where(np.isin(labelled.class_id, sorted(classes.things)), labelled.instance, 0)
+    room |= (labelled.instance > 0) & (thing == 0)
+    piece, thing_of = pieces_beside(Cloud(vertices, scene.normals, voxel), thing, room, told, minimum_area)
+    instance = np.where(room, labelled.instance, np.where(piece > 0, 0, thing_of))
+    named, labelled = _cut_anew(surface, entities, labelled, instance.astype(np.int32))
+    return _with_pieces(surface, named, labelled, piece, classes.unnamed)
 
 
 def with_unnamed_pieces(
@@ -46,9 +58,9 @@ def with_unnamed_pieces(
     if vertices is None:
         return list(entities), labelled
     normals = vertex_normals(vertices, surface.faces)
-    no_wall = _no_wall(vertices, normals, labelled.class_id == classes.wall, voxel)
-    room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling)) & ~no_wall
-    walls = of_walls(vertices, normals, (room | (labelled.instance == 0)) & (vertices[:, 2] > FLOOR), voxel)
+    no_wall = np.zeros(len(vertices), bool)
+    room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling))
+    walls = room
     piece, instance = unnamed_pieces(
         vertices,
         normals,

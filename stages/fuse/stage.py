@@ -14,7 +14,7 @@ from scenewright.schemas.segments import Segments
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
-from scenewright.stages.fuse.closing import MaskSource, close_map, is_strange
+from scenewright.stages.fuse.closing import MaskSource, bounds_of, close_map, is_strange
 from scenewright.stages.fuse.from_mesh import run_from_mesh
 from scenewright.stages.fuse.inputs import check_origin, check_segments
 from scenewright.stages.fuse.listings import Listings
@@ -73,6 +73,8 @@ def run(
 def new_mapper(parameters: FuseParameters, vocabulary: Vocabulary) -> PanopticMapper:
     """Return an empty map of the method that the parameters ask for."""
     things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
+    if parameters.merging == "ours":
+        return PanopticMapper(parameters, Ours(parameters, things, bounds_of(vocabulary)))
     return PanopticMapper(parameters, MERGING[parameters.merging](parameters, things))
 
 

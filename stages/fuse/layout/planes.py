@@ -1,4 +1,4 @@
-"""Upright planes of a surface: candidates for walls, the one with most surface first."""
+"""Planes of a surface: candidates for floor, ceiling and walls, those with most surface first."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+LEVEL = 0.9
+"""Cosine to the vertical that the normals of level surface have at least."""
 UPRIGHT = 0.3
 """Cosine to the vertical that the normals of upright surface stay under."""
 DIRECTIONS = 120
-"""Directions of planes that are told apart: every three degrees."""
+"""Directions of upright planes that are told apart: every three degrees."""
 OFFSET = 0.05
 """Width of the bins of a plane's distance from the origin [m]."""
 BAND = 0.04
@@ -18,33 +20,51 @@ FACING = float(np.cos(np.radians(25)))
 """Cosine to a plane's normal over which surface faces as it does."""
 LEAST_AREA = 0.35
 """Planes with less surface are no candidates [m^2]."""
+CELL = 0.1
+"""Edge of the cells of a plane [m]."""
 
 
 @dataclass(frozen=True)
-class UprightPlane:
-    """normal . p = offset [m]; the normal (2,) is horizontal and points to where it was seen from."""
+class Plane:
+    """normal . p = offset [m]; the normal (3,) points to where the surface was seen from, z is up."""
 
     normal: np.ndarray
     offset: float
     members: np.ndarray
     """Numbers of the vertices that lie on it and face as it does."""
 
+    @property
+    def is_level(self) -> bool:
+        """Whether it is a floor, a top or a ceiling, and no wall or front."""
+        return bool(abs(self.normal[2]) > LEVEL)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Two directions (2, 3) within it; of an upright plane the second is up."""
+        if self.is_level:
+            return np.eye(3)[:2]
+        return np.array([[-self.normal[1], self.normal[0], 0.0], [0.0, 0.0, 1.0]])
+
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return how far points (N, 2 or 3) [m] are before the plane, negative behind it."""
-        return points[:, :2] @ self.normal - self.offset
+        """Return how far points (N, 3) [m] are before the plane, negative behind it."""
+        return np.asarray(points @ self.normal - self.offset)
 
-    def along(self, points: np.ndarray) -> np.ndarray:
-        """Return the place (N,) [m] of points (N, 2 or 3) along the plane."""
-        return points[:, :2] @ np.array([-self.normal[1], self.normal[0]])
+    def cells(self, points: np.ndarray) -> np.ndarray:
+        """Return the cells (N, 2) of the plane before or behind which points (N, 3) lie."""
+        return np.floor(points @ self.axes.T / CELL).astype(np.int64)
+
+    def at(self, cells: np.ndarray, distance: float) -> np.ndarray:
+        """Return the points (N, 3) at a distance [m] before the middles of cells (N, 2)."""
+        return (self.offset + distance) * self.normal + (cells + 0.5) * CELL @ self.axes
 
 
-def upright_planes(vertices: np.ndarray, normals: np.ndarray, areas: np.ndarray) -> list[UprightPlane]:
+def upright_planes(vertices: np.ndarray, normals: np.ndarray, areas: np.ndarray) -> list[Plane]:
     """Return the planes with at least LEAST_AREA of upright surface; each vertex is of one plane.
 
     vertices, normals (V, 3), z up; areas (V,): surface that each vertex stands for [m^2].
     """
     upright = np.flatnonzero(np.abs(normals[:, 2]) < UPRIGHT)
-    planes: list[UprightPlane] = []
+    planes: list[Plane] = []
     while len(upright):
         points, weight = vertices[upright, :2].astype(float), areas[upright]
         facing = normals[upright, :2] / np.linalg.norm(normals[upright, :2], axis=1, keepdims=True)
@@ -52,8 +72,28 @@ def upright_planes(vertices: np.ndarray, normals: np.ndarray, areas: np.ndarray)
         on_plane = (facing @ normal > FACING) & (np.abs(points @ normal - offset) < BAND)
         if weight[on_plane].sum() < LEAST_AREA:
             break
-        planes.append(UprightPlane(normal, offset, upright[on_plane]))
+        planes.append(Plane(np.append(normal, 0.0), offset, upright[on_plane]))
         upright = upright[~on_plane]
+    return planes
+
+
+def level_planes(vertices: np.ndarray, normals: np.ndarray, areas: np.ndarray, *, up: bool) -> list[Plane]:
+    """Return the planes with at least LEAST_AREA of level surface that faces up, or down; arguments as above."""
+    sign = 1.0 if up else -1.0
+    level = np.flatnonzero(sign * normals[:, 2] > LEVEL)
+    planes: list[Plane] = []
+    while len(level):
+        height, weight = vertices[level, 2].astype(float), areas[level]
+        bins = np.floor((height - height.min()) / (BAND / 2)).astype(int)
+        area = np.convolve(np.bincount(bins, weights=weight), np.ones(3), mode="same")
+        middle = height.min() + (int(area.argmax()) + 0.5) * BAND / 2
+        near = np.abs(height - middle) < BAND
+        middle = float(np.average(height[near], weights=weight[near]))
+        near = np.abs(height - middle) < BAND
+        if weight[near].sum() < LEAST_AREA:
+            break
+        planes.append(Plane(np.array([0.0, 0.0, sign]), sign * middle, level[near]))
+        level = level[~near]
     return planes
 
 

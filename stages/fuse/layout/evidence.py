@@ -1,0 +1,106 @@
+"""What speaks for a plane being a floor, a wall or a ceiling, and what against: log odds, each with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scenewright.stages.fuse.free_space import FreeSpace
+from scenewright.stages.fuse.layout.planes import LEVEL, Plane
+
+BEHIND = (0.16, 0.24, 0.32, 0.4, 0.5, 0.6)
+"""Distances behind a plane at which free space is looked for [m]: nearer cells hold the surface itself."""
+FAR_BEHIND = 2.5
+"""Surface this far behind a plane is of another room [m]."""
+THIN = 0.35
+"""What is thinner than this, and was seen from both sides, is one wall [m]."""
+LARGE = 1.0
+"""Area of a plane that speaks neither for a bound of the room nor against [m^2]."""
+FAINT = 0.1
+"""Weight of votes under which masks say nothing: a score a look."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What layout is found in. All arrays are over the vertices (V,)."""
+
+    vertices: np.ndarray
+    """(V, 3) [m], world frame, z up."""
+    normals: np.ndarray
+    areas: np.ndarray
+    """[m^2]"""
+    bounding: np.ndarray
+    """Mean score of masks that said floor, wall or ceiling, 0..1 a look."""
+    furniture: np.ndarray
+    """Mean score of masks that said anything else."""
+    cameras: np.ndarray
+    """(F, 3) [m]; empty of a scan."""
+    free: FreeSpace | None
+    """None of a scan."""
+
+
+def share_behind(plane: Plane, scene: Scene) -> tuple[float, float]:
+    """Return the shares of a plane's cells behind which free space was seen, and surface.
+
+    Of what is thin and was seen from both sides only the inside is asked.
+    """
+    cells = np.unique(plane.cells(scene.vertices[plane.members]), axis=0)
+    distance = plane.distance(scene.vertices)
+    other_side = np.flatnonzero((distance < -0.03) & (distance > -THIN) & (scene.normals @ plane.normal < -0.7))
+    thickness = np.full(len(cells), np.inf)
+    own, back = _keys(cells), _keys(plane.cells(scene.vertices[other_side]))
+    order = np.argsort(own)
+    place = np.minimum(np.searchsorted(own[order], back), len(own) - 1)
+    is_own = own[order][place] == back
+    np.minimum.at(thickness, order[place[is_own]], -distance[other_side[is_own]])
+    free = np.zeros(len(cells), bool)
+    if scene.free is not None:
+        for depth in BEHIND:
+            free |= scene.free.is_free(plane.at(cells, -depth)) & (depth < thickness)
+    beyond = np.flatnonzero((distance < -0.1) & (distance > -FAR_BEHIND))
+    hidden = np.isin(own, np.unique(_keys(plane.cells(scene.vertices[beyond])))) & ~np.isfinite(thickness)
+    return float(free.mean()), float(hidden.mean())
+
+
+def evidence(plane: Plane, scene: Scene, floor: float, top: float) -> dict[str, float]:
+    """Return the log odds that each reason gives for a plane bounding the room.
+
+    floor, top [m]: heights of the floor and of the highest surface.
+    """
+    points, weight = scene.vertices[plane.members], scene.areas[plane.members]
+    free, hidden = share_behind(plane, scene)
+    reasons = {
+        "area": float(np.clip(np.log(weight.sum() / LARGE), -1.5, 1.5)),
+        "free space behind": 2.0 - 25.0 * free if scene.free is not None else 0.0,
+        "surface behind": 1.0 - 6.0 * hidden,
+        "masks": _votes(scene.bounding[plane.members], scene.furniture[plane.members], weight),
+    }
+    reasons["free space behind"] = max(reasons["free space behind"], -4.0)
+    reasons["surface behind"] = max(reasons["surface behind"], -3.0)
+    if plane.is_level:
+        height = plane.offset * plane.normal[2]
+        eyes = np.median(scene.cameras[:, 2]) - height if len(scene.cameras) else np.nan
+        if plane.normal[2] > 0 and np.isfinite(eyes):
+            reasons["height of the cameras"] = 1.5 if 0.9 <= eyes <= 2.6 else -2.0
+        if plane.normal[2] < 0:
+            reasons["height"] = 1.0 if height > floor + 2.0 else -6.0
+    else:
+        reach = float(np.quantile(points[:, 2], 0.98))
+        reasons["height"] = 1.0 if reach > top - 0.3 else -2.5 if reach < floor + 1.2 else 0.0
+        if len(scene.cameras):
+            reasons["cameras"] = -2.0 if (plane.distance(scene.cameras) > 0).mean() < 0.3 else 0.0
+    return reasons
+
+
+def _votes(bounding: np.ndarray, furniture: np.ndarray, weight: np.ndarray) -> float:
+    share = weight / weight.sum()
+    return float(np.clip(1.5 * np.log((share @ bounding + FAINT) / (share @ furniture + FAINT)), -2.5, 2.5))
+
+
+def _keys(cells: np.ndarray) -> np.ndarray:
+    return np.asarray(cells[:, 0] * (1 << 31) + cells[:, 1])
+
+
+def is_level(normals: np.ndarray) -> np.ndarray:
+    """Return which surface (V,) with normals (V, 3) faces up."""
+    return np.asarray(normals[:, 2] > LEVEL)
