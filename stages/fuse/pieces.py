@@ -7,7 +7,7 @@ back or an arm, and belongs to it.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,10 +29,10 @@ SHADOW = 0.15
 RIM, ALONG = 0.4, 0.5
 """What stands within this share of a top's width of its rim, over this share of its length, is a back or an arm of
 it."""
-SMALLER = 0.5
-"""What passes a top, and is less than this share of what there is without it, is another thing."""
-BACK = 0.1
-"""A back rises so close beside a seat [m]."""
+TOP_SHARE = 0.1
+"""A top that is a smaller share of its part parts nothing from it but what stands on it."""
+BACK, SEAT, THICK = 0.1, 0.55, 0.3
+"""A side or a back rises so close beside a top [m]; beside a seat, which is lower, so close with its cushions."""
 ON_RIM = 0.8
 """Share of a foot that lies on the rim then."""
 LEAST_RISE = 0.75
@@ -81,8 +81,9 @@ class Footprint:
         grid = np.zeros(cells.max(axis=0) - self.corner + reach + 2, bool)
         grid[tuple((cells - self.corner).T)] = True
         self.grid = ndimage.binary_fill_holes(ndimage.binary_closing(grid, _disc(reach)))
-        self.width = 2.0 * float(ndimage.distance_transform_edt(self.grid).max())
-        """Of the widest place [cells]."""
+        self._depth = ndimage.distance_transform_edt(self.grid) - ndimage.distance_transform_edt(~self.grid)
+        self.width = 2.0 * self.cell * float(self._depth.max())
+        """Of the widest place [m]."""
 
     def holds(self, points: np.ndarray) -> np.ndarray:
         """Return which points (N, 2 or more) lie above, on or below it."""
@@ -92,15 +93,20 @@ class Footprint:
         result[inside] = self.grid[tuple(cells[inside].T)]
         return result
 
-    def rim_share(self, points: np.ndarray) -> tuple[float, float]:
+    def depth(self, points: np.ndarray) -> np.ndarray:
+        """Return how far points (N, 2 or more) are within the rim [m], negative outside."""
+        cells = np.floor(points[:, :2] / self.cell).astype(int) - self.corner
+        known = ((cells >= 0) & (cells < self.grid.shape)).all(axis=1)
+        at = np.full(len(cells), -np.inf)
+        at[known] = self._depth[tuple(cells[known].T)]
+        return at * self.cell
+
+    def rim_share(self, points: np.ndarray, outside: float) -> tuple[float, float]:
         """Return which share of the foot of points (N, 2 or more) lies on the rim, within or close outside, and over
         which share of its length."""
-        cells = np.unique(np.floor(points[:, :2] / self.cell).astype(int) - self.corner, axis=0)
-        known = ((cells >= 0) & (cells < self.grid.shape)).all(axis=1)
-        depth = ndimage.distance_transform_edt(self.grid) - ndimage.distance_transform_edt(~self.grid)
-        at = np.full(len(cells), -np.inf)
-        at[known] = depth[tuple(cells[known].T)]
-        on_rim = (at >= -BACK / self.cell) & (at <= max(1.0, RIM * self.width))
+        cells = np.unique(np.floor(points[:, :2] / self.cell).astype(int), axis=0)
+        at = self.depth((cells + 0.5) * self.cell)
+        on_rim = (at >= -outside) & (at <= max(self.cell, RIM * self.width))
         along = np.linalg.svd(cells - cells.mean(axis=0), full_matrices=False)[2][0] if len(cells) > 1 else np.ones(2)
         length, whole = np.ptp(cells @ along) + 1, np.ptp(np.argwhere(self.grid) @ along) + 1
         return float(on_rim.mean()), float(length / whole)
@@ -115,16 +121,12 @@ def connected(points: np.ndarray, voxel: float) -> np.ndarray:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def cut_parts(cloud: Cloud, parts: np.ndarray, whole: Collection[int] = ()) -> tuple[np.ndarray, set[int]]:
-    """Return the parts (V,) cut at level tops, and which of the new parts stand on one.
-
-    Nothing is cut from those that are `whole`.
-    """
-    result, standing = parts.copy(), set()
+def cut_parts(cloud: Cloud, parts: np.ndarray) -> tuple[np.ndarray, set[int], dict[int, int]]:
+    """Return the parts (V,) cut at level tops, which of the new ones stand on one, and {new part: the part that it was
+    cut from}."""
+    result, standing, cut_from = parts.copy(), set(), {}
     after = int(parts.max(initial=0)) + 1
     for top in _tops(cloud, parts):
-        if top.part in whole:
-            continue
         of_part = np.flatnonzero(result == top.part)
         if not len(of_part):
             continue
@@ -135,38 +137,41 @@ def cut_parts(cloud: Cloud, parts: np.ndarray, whole: Collection[int] = ()) -> t
         rest = np.flatnonzero(np.where(inside, (rise > LEAST_RISE * cloud.voxel) | (over < -RISE), True))
         for own in _groups(connected(points[rest], cloud.voxel)):
             group = rest[own]
-            rising, below = (over[group] > RISE) & ~inside[group], over[group] < -RISE
+            rising, below = over[group] > RISE, over[group] < -RISE
             if not below.any():
                 if np.quantile(rise[group], 0.75) > cloud.voxel and not _is_back(top, points[group], over[group]):
                     result[of_part[group]] = after
                     standing.add(after)
                     after += 1
                 continue
-            above = (over[group] > RISE).sum()
-            hangs = ((over[group] > -APRON) & below & inside[group]).sum() >= FEWEST
-            if rising.sum() >= FEWEST and hangs:  # it hangs together with what is under the top: cut straight down
-                outline = Footprint(points[group[rising], :2], cloud.voxel)
-                group = group[(~inside[group] & outline.holds(points[group])) | (inside[group] & (over[group] > RISE))]
-            elif above < FEWEST or len(group) > SMALLER * len(rest):
+            if rising.sum() < FEWEST or len(top.members) < TOP_SHARE * len(of_part):
                 continue
+            if ((over[group] > -APRON) & below & inside[group]).sum() >= FEWEST:
+                # It hangs together with what is under the top: cut straight down.
+                outline = Footprint(points[group[rising], :2], cloud.voxel)
+                at_rim = top.footprint.depth(points[group]) < BACK
+                group = group[rising | (at_rim & outline.holds(points[group]) & (np.abs(over[group]) > RISE))]
             if not _is_back(top, points[group], over[group]):
                 result[of_part[group]] = after
+                cut_from[after] = top.part
                 after += 1
-    return result, standing
+    return result, standing, cut_from
 
 
 def _is_back(top: _Top, points: np.ndarray, over: np.ndarray) -> bool:
     """Whether what rises over a top stands along its rim, close by, over half of its length: a back, an arm, a side."""
     foot = points[(over > 0) & (over < APRON)]
-    on_rim, length = top.footprint.rim_share(foot if len(foot) else points)
+    on_rim, length = top.footprint.rim_share(foot if len(foot) else points, THICK if top.level < SEAT else BACK)
     return on_rim >= ON_RIM and length >= ALONG
 
 
-def join_parts(cloud: Cloud, parts: np.ndarray, standing: Collection[int], minimum_area: float) -> np.ndarray:
+def join_parts(
+    cloud: Cloud, parts: np.ndarray, standing: Collection[int], cut_from: Mapping[int, int], minimum_area: float
+) -> np.ndarray:
     """Return the parts (V,) joined with the closest larger one between which and them the surface was not seen.
 
     Above or below it, or a scrap beside it, which is smaller than `minimum_area` [m^2]. What stands on a level top
-    (`standing`) stays apart.
+    (`standing`) stays apart, and so does what was cut from each other.
     """
     result = parts.copy()
     names, sizes = np.unique(parts[parts >= 0], return_counts=True)
@@ -180,6 +185,8 @@ def join_parts(cloud: Cloud, parts: np.ndarray, standing: Collection[int], minim
         neighbours: list[tuple[float, int]] = []
         for large in names.tolist():
             below, above = (small, large) if (low[small], small) < (low[large], large) else (large, small)
+            if cut_from.get(small) == large or cut_from.get(large) == small:
+                continue
             if (len(members[large]), large) <= (len(members[small]), small) or low[above] > top[below] - RISE:
                 continue
             near = trees[large].query(cloud.vertices[members[small]], distance_upper_bound=STACKED_GAP)[0]
@@ -203,8 +210,10 @@ def pieces_of(cloud: Cloud, free: np.ndarray, minimum_area: float) -> np.ndarray
     parts = np.full(len(cloud.vertices), -1)
     members = np.flatnonzero(free)
     parts[members] = connected(cloud.vertices[members], cloud.voxel)
-    parts, standing = cut_parts(cloud, parts)
-    return numbered_pieces(cloud, join_parts(cloud, parts, standing, minimum_area), standing, minimum_area)
+    parts, standing, cut_from = cut_parts(cloud, parts)
+    standing |= _on_tops(cloud, parts, 0)
+    joined = join_parts(cloud, parts, standing, cut_from, minimum_area)
+    return numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area)
 
 
 def numbered_pieces(cloud: Cloud, parts: np.ndarray, standing: Collection[int], minimum_area: float) -> np.ndarray:
@@ -300,12 +309,13 @@ def pieces_beside(
     parts = np.where(room, -1, np.where(instance > 0, instance, -1)).astype(np.int64)
     parts[free] = first + connected(cloud.vertices[free], cloud.voxel)
     last = int(parts.max(initial=0))
-    cut, standing = cut_parts(cloud, parts)
+    cut, standing, cut_from = cut_parts(cloud, parts)
     for part in np.unique(cut[(cut > last) & (instance > 0)]):
         own = cut == part
         if told[own].mean() >= TOLD:
             cut[own] = parts[own]
             standing.discard(int(part))
+            cut_from.pop(int(part), None)
     standing |= _on_tops(cloud, cut, first)
     thing_of = np.where(cut < first, np.maximum(cut, 0), 0).astype(np.int32)
     loose = [p for p in np.unique(cut[cut >= first]).tolist() if p <= last and p not in standing]
@@ -315,8 +325,8 @@ def pieces_beside(
         if host:
             thing_of[own], cut[own] = host, -1
     cut = np.where(cut < first, -1, cut)
-    joined = join_parts(cloud, cut, standing, minimum_area)
-    return numbered_pieces(cloud, joined, standing, minimum_area), thing_of
+    joined = join_parts(cloud, cut, standing, cut_from, minimum_area)
+    return numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area), thing_of
 
 
 def _on_tops(cloud: Cloud, parts: np.ndarray, first: int) -> set[int]:
