@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.base import as_vector
 from scenewright.schemas.panoptic_map import EntitiesFile, Entity
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
 from scenewright.stages.fuse.agreed_names import with_agreed_names, without_claimed
+from scenewright.stages.fuse.belief import doubted, flush_shares
+from scenewright.stages.fuse.belief import usual_score as usual_score_of
 from scenewright.stages.fuse.counts import TripleCounts
 from scenewright.stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
 from scenewright.stages.fuse.impossible_names import without_impossible_names
+from scenewright.stages.fuse.names import name_of, rates_of, said_of
+from scenewright.stages.kit.class_extents import extent_of
 from scenewright.stages.fuse.mapping import PanopticMapper
 from scenewright.stages.fuse.parameters import FuseParameters
 from scenewright.stages.fuse.layout.evidence import Scene
@@ -95,6 +99,47 @@ def scene_of(surface: Surface, labels: np.ndarray, scores: Mapping[int, Mapping[
     return Scene(vertices, vertex_normals(vertices, surface.faces), areas, bounding[labels], furniture[labels], np.array(mapper.cameras).reshape(-1, 3), mapper.free_space)
 
 
+def things_told(segment, scores, sightings, things):
+    table = np.zeros(int(segment.max(initial=0)) + 1)
+    for label in range(1, len(table)):
+        table[label] = sum(x for c, x in scores.get(label, {}).items() if c in things) / max(1, sightings.get(label, 0))
+    return np.minimum(table, 1.0)[segment]
+
+
+def without_doubted(entities, labelled, told, things, scene, voxel):
+    mean = {e.instance: float(told[labelled.instance == e.instance].mean()) if (labelled.instance == e.instance).any() else 0.0 for e in entities if e.class_id in things}
+    flush = flush_shares(scene.vertices, scene.normals, labelled.instance, voxel)
+    reasons = doubted(sorted(mean), mean, flush)
+    import os
+    if os.environ.get("DBG"):
+        for e in entities:
+            if e.instance in mean: print("   ", e.class_id, len(e.mesh.vertices), round(mean[e.instance],2), "flush", round(float(flush[e.instance]),2), reasons.get(e.instance,""))
+    gone = np.isin(labelled.instance, sorted(reasons))
+    return [e for e in entities if e.instance not in reasons], LabelledSurface(labelled.segment, np.where(gone, 0, labelled.class_id).astype(np.int32), np.where(gone, 0, labelled.instance).astype(np.int32)), usual_score_of(sorted(mean), mean, flush)
+
+
+def with_names(entities, labelled, scores, sightings, vocabulary, unnamed, things):
+    claimed = {k: {l for e in entities if e.instance != k for l in e.segments} for k in ()}
+    of_masks = {label: e.instance for e in entities for label in e.segments}
+    said = {}
+    for e in entities:
+        if e.class_id in things:
+            own = labelled.segment[labelled.instance == e.instance]
+            others = frozenset(label for label, k in of_masks.items() if k != e.instance)
+            said[e.instance] = said_of(own, scores, sightings, others)
+    usual = rates_of([said[e.instance] for e in entities if e.instance in said and e.segments], things - {unnamed})
+    result, class_id = [], labelled.class_id.copy()
+    for e in entities:
+        if e.instance in said:
+            import os
+            if os.environ.get('DBG'): print(usual)
+            naming = name_of(said[e.instance], usual, extent_of(np.asarray(e.mesh.vertices)), vocabulary, unnamed)
+            class_id[labelled.instance == e.instance] = naming.class_id
+            e = replace(e, class_id=naming.class_id)
+        result.append(e)
+    return result, replace(labelled, class_id=class_id)
+
+
 def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, progress: Progress) -> ClosedMap:
     """Merge what is one instance, draw the surface and cut it into entities.
 
@@ -130,10 +175,8 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
             bounds = bounds_of(vocabulary)
             scene = scene_of(surface, merged[surface.segment], mapper.merging.class_scores.by_segment, mapper, bounds)
             layout = find_layout(scene)
-            entities, labelled = without_impossible_names(
-                entities, labelled, scores, mapper.sightings, vocabulary, unnamed
-            )
-            told = share_told(labelled, scores, mapper.sightings)
+            told = things_told(labelled.segment, scores, mapper.sightings, things)
+            entities, labelled, usual = without_doubted(entities, labelled, told, things, scene, parameters.voxel_size)
             entities, labelled = with_layout(surface, entities, labelled, layout, told, things, vocabulary)
             classes = Classes(
                 floor=vocabulary.by_name("floor").id,
@@ -144,13 +187,10 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
                 tables=flat_topped,
             )
             size = {"voxel": parameters.voxel_size, "minimum_area": parameters.unnamed_area}
-            scores = without_claimed(scores, entities)
+            told = share_told(labelled, scores, mapper.sightings)
             if parameters.unnamed_area > 0:
                 entities, labelled = with_pieces(surface, entities, labelled, classes, scene, layout, told, **size)
-            least = parameters.minimum_prediction_share
-            entities, labelled = with_agreed_names(
-                entities, labelled, scores, mapper.sightings, vocabulary, unnamed, least
-            )
+            entities, labelled = with_names(entities, labelled, scores, mapper.sightings, vocabulary, unnamed, things)
     file = EntitiesFile(
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,

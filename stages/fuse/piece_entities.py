@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from scenewright.stages.fuse.pieces import Cloud, pieces_beside
+from scenewright.stages.fuse.pieces import Cloud, grown_things, pieces_beside
 from scenewright.stages.fuse.surface import Surface
 from scenewright.stages.fuse.unnamed_pieces import CEILING, FLOOR, topped_parts, unnamed_pieces
 from scenewright.stages.fuse.walls import of_walls
@@ -33,7 +33,10 @@ def with_pieces(surface, entities, labelled, classes, scene, layout, told, *, vo
     room = np.isin(labelled.class_id, (classes.floor, classes.wall, classes.ceiling)) | (layout.owner > 0) & (labelled.class_id == 0)
     thing = np.where(np.isin(labelled.class_id, sorted(classes.things)), labelled.instance, 0)
     room |= (labelled.instance > 0) & (thing == 0)
-    piece, thing_of = pieces_beside(Cloud(vertices, scene.normals, voxel), thing, room, told, minimum_area)
+    cloud = Cloud(vertices, scene.normals, voxel)
+    grown = grown_things(cloud, thing, room, minimum_area)
+    told = np.where(grown != thing, 1.0, told)
+    piece, thing_of = pieces_beside(cloud, grown, room, told, minimum_area)
     instance = np.where(room, labelled.instance, np.where(piece > 0, 0, thing_of))
     named, labelled = _cut_anew(surface, entities, labelled, instance.astype(np.int32))
     return _with_pieces(surface, named, labelled, piece, classes.unnamed)

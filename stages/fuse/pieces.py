@@ -358,3 +358,28 @@ def _host(cloud: Cloud, own: np.ndarray, thing_of: np.ndarray) -> int:
         if touching.any() and share >= WITHIN and share > best:
             best, host = share, name
     return host
+
+
+HELD = 0.3
+"""A piece of which a single thing of masks has this share is that thing."""
+
+
+def grown_things(cloud: Cloud, instance: np.ndarray, room: np.ndarray, minimum_area: float) -> np.ndarray:
+    """Return the things (V,) of masks, 0 none, each with all of the piece of which it alone has a part.
+
+    Masks that have only the seat of a chair, or half of a sofa, are of the whole; arguments as in `pieces_beside`.
+    """
+    piece = pieces_of(cloud, ~room, minimum_area)
+    result = instance.copy()
+    sizes = np.bincount(instance)
+    for number in range(1, int(piece.max(initial=0)) + 1):
+        own = piece == number
+        inside = np.bincount(instance[own], minlength=len(sizes))
+        unnamed, inside[0] = inside[0], 0
+        within = np.flatnonzero(inside >= 0.02 * own.sum())
+        if len(within) != 1 or not unnamed:
+            continue
+        thing = int(within[0])
+        if inside[thing] >= HELD * own.sum() and inside[thing] >= 0.6 * sizes[thing]:
+            result[own & (instance == 0)] = thing
+    return result
