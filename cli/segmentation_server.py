@@ -22,7 +22,7 @@ from scenewright.stages.kit.stage import External, Optionally
 from scenewright.stages.segment.backends.service.server import SegmentationServer, revision_of, segment_request
 from scenewright.stages.segment.choice import BackendRequest, choose_backend
 from scenewright.stages.segment.parameters import STAGE, SegmentParameters
-from scenewright.stages.segment.registry import backend_for
+from scenewright.stages.segment.registry import AUTO, backend_for, backends_for
 from scenewright.stages.segment.settings import geometric_settings
 
 _BLANK = SegmentRequest(
@@ -50,8 +50,8 @@ def open_server(
     """
     parameters = parameters_for(STAGE, given, read_config(config) if config else {}, str(config))
     assert isinstance(parameters, SegmentParameters)
-    declared = backend_for(parameters.backend)
-    if declared.address:
+    declared = (backend_for(AUTO),) if parameters.backend == AUTO else backends_for(parameters.backend)
+    if any(one.address for one in declared):
         raise UsageError("a service cannot be served", hint="serve the backend behind it")
     resolved = {role: _resolve(role, path) for role, path in files.items()}
     device = choose_device(device)
@@ -60,6 +60,7 @@ def open_server(
             parameters,
             resolved.get("weights"),
             mask_weights=resolved.get("mask_weights"),
+            semantic_weights=resolved.get("semantic_weights"),
             labels=resolved.get("labels"),
             sidecar=resolved.get("sidecar"),
             device=device,
@@ -78,7 +79,7 @@ def open_server(
     )
     # Libraries load and kernels are compiled on first use: now, and not while a client waits.
     segment_request(_BLANK, backend, geometric_settings(parameters))
-    required = ("color",) if "color" in declared.needs else ("depth",)
+    required = ("color",) if all("color" in one.needs for one in declared) else ("depth",)
     return SegmentationServer(host, port, backend, geometric_settings(parameters), revision=revision, required=required)
 
 

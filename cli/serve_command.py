@@ -19,6 +19,9 @@ def serve(
     mask_weights: Annotated[
         File, typer.Option("--mask-weights", help="As of `segment`.", rich_help_panel="Inputs")
     ] = None,
+    semantic_weights: Annotated[
+        File, typer.Option("--semantic-weights", help="As of `segment`.", rich_help_panel="Inputs")
+    ] = None,
     labels: Annotated[File, typer.Option("--labels", help="As of `segment`.", rich_help_panel="Inputs")] = None,
     sidecar: Annotated[File, typer.Option("--sidecar", help="As of `segment`.", rich_help_panel="Inputs")] = None,
     config: Annotated[
@@ -44,7 +47,13 @@ def serve(
     from scenewright.cli.segmentation_server import open_server
 
     option_values = {"backend": backend, "words": words, "score_threshold": score_threshold}
-    files = {"weights": weights, "mask_weights": mask_weights, "labels": labels, "sidecar": sidecar}
+    files = {
+        "weights": weights,
+        "mask_weights": mask_weights,
+        "semantic_weights": semantic_weights,
+        "labels": labels,
+        "sidecar": sidecar,
+    }
     server = open_server(
         {name: value for name, value in option_values.items() if value is not None},
         {role: path for role, path in files.items() if path is not None},

@@ -9,6 +9,16 @@ from scenewright.schemas.artifact import Artifact, Document
 from scenewright.schemas.base import Model
 
 
+class Witness(Model):
+    """What one of several networks said of a mask."""
+
+    network: int
+    """Its place in `networks` of segments.json."""
+    class_id: int
+    """Class id of data/vocabulary.toml."""
+    score: float
+
+
 class FrameSegment(Model):
     """One fused segment (P_k, c_k, o_k) of a frame: geometrically connected pixels with one panoptic label."""
 
@@ -25,6 +35,8 @@ class FrameSegment(Model):
     score: float
     area: int
     """Pixels."""
+    witnesses: tuple[Witness, ...] = Field(default=(), exclude_if=lambda witnesses: not witnesses)
+    """What each network said, where several found this; class and score are the leading sum of theirs."""
 
 
 class FrameSegments(Model):
@@ -46,6 +58,8 @@ class SegmentsFile(Model):
     recognised: float | None = None
     """Share of the area of masks of things that got a name, where `object` says that the segmenter did not recognise
     what it saw (our own network); None where `object` is a class like any other."""
+    networks: tuple[str, ...] = Field(default=(), exclude_if=lambda networks: not networks)
+    """The networks that `witnesses` number; empty: there was one."""
     width: int
     height: int
     frames: tuple[FrameSegments, ...]

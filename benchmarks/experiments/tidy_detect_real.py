@@ -66,7 +66,7 @@ CLASSES = {6: "plate", 7: "plate", 8: "cup", 9: "cup"}
 OVERLAP = 0.5
 LEFT_OUT = "frames_left_out"
 SIZES: dict[str, Sizes] = {"frames_known": "known", "frames_estimated": "estimated", LEFT_OUT: "estimated"}
-GRID = tuple(Limits(least_round=share, slimmest=slim) for share in (0.4, 0.3, 0.5, 0.6) for slim in (10.0, 5.0, 4.0))
+GRID = tuple(Limits(least_round=share, slimmest=slim) for share in (0.35, 0.3, 0.4, 0.5) for slim in (10.0, 5.0, 4.0))
 LEAST_CONFIDENCE = 0.5
 """Of what is planned for, as the command's."""
 STACKING, TIMES_OF = ("ours", "stack"), "tier2"

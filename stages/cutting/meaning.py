@@ -4,7 +4,8 @@ A thing has three directions, at right angles: the long one, the wide one and th
 those of the smallest box around it, however it lies.
 
 - slices: cut across the long direction alone, each all that there is of the thing between two planes, and at most 1.5
-  times as thick along it as the thing is thin; all as thick.
+  times as thick along it as the thing is thin; of a flat thing (a disc, a slab: at least twice as wide as thin) no
+  thicker than it is thin, as what is thicker lies there like a strip; all as thick.
 - strips: never cut across the long direction (of the part of the thing that is made strips), and at least twice as long
   as wide; all as large.
 - cubes: the longest edge at most 1.5 times the shortest; all as large.
@@ -27,7 +28,7 @@ from scenewright.stages.kit.geometry.transforms import apply, inverse, transform
 from scipy.optimize import linear_sum_assignment
 
 NARROW = 2.0
-"""Length over width that makes a strip."""
+"""Length over width that makes a strip, and width over thickness that makes a thing flat."""
 CUBE, CHUNK = 1.5, 4.0
 """Most of the longest edge over the shortest. A block twice as long as thick is two cubes. Halves and quarters of foods
 are demonstrated as chunks, and are up to four times as long as thick."""
@@ -54,6 +55,8 @@ class Meaning:
     """Of edges (..., 3) [m], shortest first, the length (...) along the thing's long direction, the thing's edges."""
     bound: float
     """The greatest ratio of what is meant."""
+    bound_of_flat: float
+    """The same of a flat thing."""
     said: str
     """What a ratio says."""
     uncut: str = ""
@@ -63,7 +66,11 @@ class Meaning:
 
     def misfit(self, edges: np.ndarray, length: np.ndarray, thing: np.ndarray) -> np.ndarray:
         """Return 1 or less for what is meant (...); takes what `ratio` takes."""
-        return self.ratio(edges, length, thing) / self.bound
+        return self.ratio(edges, length, thing) / self.most(thing)
+
+    def most(self, thing: np.ndarray) -> np.ndarray:
+        """Return the greatest ratio of what is meant (...), of things with such edges (3, ...) [m]."""
+        return np.where(thing[WIDE] >= NARROW * thing[THIN], self.bound_of_flat, self.bound)
 
 
 def _blunt(edges: np.ndarray, length: np.ndarray, thing: np.ndarray) -> np.ndarray:
@@ -79,10 +86,12 @@ def _stout(edges: np.ndarray, length: np.ndarray, thing: np.ndarray) -> np.ndarr
 
 
 MEANINGS: dict[CategoryName, Meaning] = {
-    "chunks": Meaning((LONG, WIDE, THIN), _blunt, CHUNK, "as long as thick"),
-    "slices": Meaning((LONG,), _thick, SLICE, "as thick as the thing is thin", "span the whole cross section", True),
-    "strips": Meaning((WIDE, THIN), _stout, 1.0 / NARROW, "as wide as long", "run the whole length"),
-    "cubes": Meaning((LONG, WIDE, THIN), _blunt, CUBE, "as long as thick"),
+    "chunks": Meaning((LONG, WIDE, THIN), _blunt, CHUNK, CHUNK, "as long as thick"),
+    "slices": Meaning(
+        (LONG,), _thick, SLICE, 1.0, "as thick as the thing is thin", "span the whole cross section", True
+    ),
+    "strips": Meaning((WIDE, THIN), _stout, 1.0 / NARROW, 1.0 / NARROW, "as wide as long", "run the whole length"),
+    "cubes": Meaning((LONG, WIDE, THIN), _blunt, CUBE, CUBE, "as long as thick"),
 }
 
 
@@ -181,7 +190,8 @@ def judge(
     met = []
     for name in names:
         taken = [int(row) for row, column in zip(rows, columns, strict=True) if wanted[column][0] == name]
-        met.append(_met(name, sum(word == name for word, _ in wanted), taken, fragments, edges, *misfits[name]))
+        number = sum(word == name for word, _ in wanted)
+        met.append(_met(name, number, taken, things, fragments, edges, *misfits[name]))
     return tuple(met)
 
 
@@ -206,6 +216,7 @@ def _met(
     name: CategoryName,
     wanted: int,
     taken: Sequence[int],
+    things: Sequence[Thing],
     fragments: Sequence[Made],
     edges: np.ndarray,
     fits: np.ndarray,
@@ -223,8 +234,9 @@ def _met(
         evenness = max(evenness, max(sizes) / min(sizes))
     count = int(fits[list(taken)].sum())
     said = f"{count} of {wanted} are {name}"
-    if taken and (worst := max(misfit[k] for k in taken)) > MET:
-        said += f": the worst is {worst * meaning.bound:.3g} times {meaning.said}, at most {meaning.bound:g}"
+    if taken and misfit[worst := max(taken, key=lambda k: misfit[k])] > MET:
+        most = float(meaning.most(things[fragments[worst].thing].size))
+        said += f": the worst is {misfit[worst] * most:.3g} times {meaning.said}, at most {most:g}"
     if cut_otherwise := sum(not whole[k] for k in taken):
         said += f": {cut_otherwise} do not {meaning.uncut}"
     kind = ("thickest", "thinnest") if meaning.by_thickness else ("largest", "smallest")

@@ -25,9 +25,12 @@ LABEL_FILES = {
     "coco-panoptic": "labels/coco_panoptic.toml",
     "ade20k": "labels/ade20k.toml",
     "words": "labels/words.toml",
+    "pascal-voc": "labels/pascal_voc.toml",
 }
 """Label set -> file of data/."""
 LABEL_TABLES = tuple(LABEL_FILES.values())
+FIRST_OF_ADE20K = 31
+"""Labels of mlcommons' reduced set: the first of ADE20K's 150, which are its most frequent."""
 OWN = "scenewright"
 """The label set that is the vocabulary itself."""
 MATCHED = (OWN, "coco-panoptic", "ade20k", "words")
@@ -102,7 +105,8 @@ def plain(name: str) -> str:
 
 @cache
 def load_label_set(name: str) -> LabelSet:
-    """Return a label set: `coco-panoptic`, `coco-80` (its things), `ade20k`, or `scenewright` (the vocabulary).
+    """Return a label set: `coco-panoptic`, `coco-80` (its things), `ade20k`, `ade20k-31` (its first 31, mlcommons'
+    reduced set), `pascal-voc`, or `scenewright` (the vocabulary).
 
     Raises BadInput for another name.
     """
@@ -111,8 +115,10 @@ def load_label_set(name: str) -> LabelSet:
     if name == "coco-80":
         thing_labels = [label for label in load_label_set("coco-panoptic").labels if label.kind == "thing"]
         return LabelSet(name, tuple(thing_labels))
+    if name == "ade20k-31":
+        return LabelSet(name, load_label_set("ade20k").labels[:FIRST_OF_ADE20K])
     if name not in LABEL_FILES:
-        names = ", ".join((*LABEL_FILES, "coco-80", OWN))
+        names = ", ".join((*LABEL_FILES, "coco-80", "ade20k-31", OWN))
         raise BadInput(f"no label set {name!r}", hint=f"label sets: {names}")
     return read_label_table(LABELS_FOLDER.parent / LABEL_FILES[name])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import logging
 import multiprocessing
 import os
 import signal
@@ -19,8 +20,9 @@ from scenewright.schemas.errors import MachineFailure
 from scenewright.schemas.segments import FrameSegments
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.formats.masks import encode_panoptic_png
-from scenewright.stages.segment.choice import Backend, BackendRequest, choose_backend
+from scenewright.stages.segment.choice import BackendRequest, choose_backend
 from scenewright.stages.segment.one_frame import describe, segment_frame
+from scenewright.stages.segment.panoptic import Backend
 
 LEAST_FRAMES_EACH = 60
 """Least frames of a process: with fewer it is not worth its start, which takes as long as some ten to twenty
@@ -102,7 +104,9 @@ class _Opened:
 
 
 def _open(request: BackendRequest, streams: tuple[str, ...], parent: int) -> None:
-    """Open log and backend in a worker, which ends with its parent and uses one thread."""
+    """Open log and backend in a worker, which ends with its parent, uses one thread, and does not say again what its
+    parent said when it opened them."""
+    logging.getLogger("scenewright").setLevel(logging.ERROR)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears it and ends the workers
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(SET_PARENT_DEATH_SIGNAL, int(signal.SIGKILL), 0, 0, 0)

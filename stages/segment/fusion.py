@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from scenewright.schemas.segments import Witness
 from scenewright.stages.segment.clustering import largest_cluster
 from scenewright.stages.segment.geometric import relabel
 from scenewright.stages.segment.overlaps import LabelPixels, overlap_table, pixels_of_labels
@@ -44,6 +45,7 @@ class FusedSegment:
     is_thing: bool
     score: float
     area: int
+    witnesses: tuple[Witness, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -167,5 +169,7 @@ def describe(labels: np.ndarray, owner: np.ndarray, panoptic: PanopticFrame) -> 
             continue
         mask = panoptic.masks[mask_id]
         instance = instances.setdefault(mask_id, len(instances) + 1)
-        segments.append(FusedSegment(label, mask.class_id, instance, mask.is_thing, mask.score, int(areas[label])))
+        segments.append(
+            FusedSegment(label, mask.class_id, instance, mask.is_thing, mask.score, int(areas[label]), mask.witnesses)
+        )
     return FusedFrame(ids=ids, segments=tuple(segments))

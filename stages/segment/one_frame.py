@@ -6,9 +6,9 @@ import numpy as np
 from scenewright.schemas.segments import FrameSegment, FrameSegments
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
 from scenewright.stages.segment import fusion_ours, fusion_thesis, fusion_voxblox
-from scenewright.stages.segment.choice import Backend
 from scenewright.stages.segment.fusion import FusedFrame, FusionRule
 from scenewright.stages.segment.geometric import segment_depth
+from scenewright.stages.segment.panoptic import Backend
 from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.settings import fusion_settings, geometric_settings
 
@@ -44,6 +44,9 @@ def describe(index: int, fused: FusedFrame) -> FrameSegments:
                 is_thing=segment.is_thing,
                 score=round(segment.score, 4),
                 area=segment.area,
+                witnesses=tuple(
+                    witness.model_copy(update={"score": round(witness.score, 4)}) for witness in segment.witnesses
+                ),
             )
             for segment in fused.segments
         ),

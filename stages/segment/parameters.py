@@ -13,6 +13,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.estimates import USUAL_FRAME, Estimate, Inputs
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 from scenewright.stages.segment.registry import (
+    AND,
     all_backends,
     backend_help,
     check_backend,
@@ -86,6 +87,15 @@ class CommonParameters(Parameters):
         0.5, gt=0, lt=1, description="Detections of one class that overlap more than this are one (IoU)"
     )
 
+    tiles: int | None = Field(
+        None,
+        ge=0,
+        le=4,
+        description="Run the network that finds things on this many overlapping tiles a side too (2: four of .6 of the "
+        "frame's sides): small things, at more time; 0: none (default: those of `detector`, five times slower; none of "
+        "`tflite`, `onnx`)",
+    )
+
     @field_validator("backend")
     @classmethod
     def _check_backend(cls, backend: str) -> str:
@@ -93,6 +103,13 @@ class CommonParameters(Parameters):
             return check_backend(backend)
         except ValueError as error:
             raise PydanticCustomError("backend", "{reason}", {"reason": str(error)}) from None
+
+    @field_validator("tiles")
+    @classmethod
+    def _check_tiles(cls, tiles: int | None) -> int | None:
+        if tiles == 1:
+            raise PydanticCustomError("tiles", "one tile is the frame itself; 0 for none, or 2 to 4 a side")
+        return tiles
 
 
 if TYPE_CHECKING:
@@ -105,9 +122,10 @@ else:
 
 def check(parameters: SegmentParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for masks that no backend asked for, and for a backend that asks for masks and has none."""
-    if parameters.backend == "masks" and "masks" not in inputs:
+    names = parameters.backend.split(AND)
+    if "masks" in names and "masks" not in inputs:
         raise UsageError("--backend masks needs a folder of masks", hint="--masks FOLDER (docs/MASKS.md)")
-    if parameters.backend != "masks" and "masks" in inputs:
+    if "masks" not in names and "masks" in inputs:
         raise UsageError("--masks is for --backend masks alone", hint="add --backend masks, or leave --masks out")
 
 
@@ -134,8 +152,8 @@ STAGE = Stage(
         ),
         "semantic_weights": Optionally(
             External(
-                "Semantic segmenter (DeepLab with PASCAL VOC's classes, .tflite) as the witness of the detector: what "
-                "both see counts at half the score, what it denies loses its name",
+                "Semantic network (.tflite, .onnx). With `detector` it is a witness: what both see counts at half the "
+                "score, what it denies loses its name; with `tflite` and `onnx` it names what no instance covers",
                 weights=True,
             ),
             usual=usual_witness,
@@ -143,7 +161,7 @@ STAGE = Stage(
         "labels": Optionally(
             External("The network's labels and their classes (TOML as in data/labels), or a list of words, one a line")
         ),
-        "sidecar": Optionally(External("TOML that says what goes into an ONNX network and what comes out")),
+        "sidecar": Optionally(External("TOML that says what goes into a network and what comes out")),
         "masks": Optionally(
             External("Masks made elsewhere, for --backend masks: COCO, SAM, PNG or NPZ files (docs/MASKS.md)")
         ),
@@ -153,7 +171,7 @@ STAGE = Stage(
     versions="registry",
     data_files=data_files,
     check=check,
-    extras=tuple(extra for declared in all_backends() for extra in declared.extras),
+    extras=tuple(dict.fromkeys(extra for declared in all_backends() for extra in declared.extras)),
     example="scenewright segment --sequence outputs/demo/sequence --out outputs/demo/segments",
     estimate=_estimate,
 )

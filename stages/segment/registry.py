@@ -16,6 +16,13 @@ from scenewright.stages.kit.services.address import check_address
 from scenewright.stages.kit.stage import Extra, Parameters
 
 AUTO = "auto"
+AND = "+"
+"""Between the names of backends of which each judges every frame."""
+RUNTIMES = ("onnxruntime", "ai-edge-litert")
+"""What runs networks given as files: one given with --weights, or the semantic one beside it."""
+LITERT = Extra(
+    "ai-edge-litert", "ai_edge_litert", "segment with a .tflite network: pip install ai-edge-litert (make extras)"
+)
 
 
 def _nothing(parameters: Any) -> tuple[str, ...]:
@@ -41,6 +48,10 @@ class BackendDeclaration:
     """Streams without which it sees nothing in a sequence."""
     weights: str = ""
     """What `--weights` is to it, for the help; empty: it takes none."""
+    endings: tuple[str, ...] = ()
+    """Of those, how the names of files end that it can run; empty: it does not go by the name."""
+    takes: frozenset[Literal["tiles", "semantic_weights"]] = frozenset()
+    """Common options and inputs that say something to it."""
     parameters: type[Parameters] | None = None
     """Options that are its own; they become options of `segment`."""
     exclusive: tuple[str, ...] = ()
@@ -91,11 +102,23 @@ def backend_for(backend: str) -> BackendDeclaration:
     raise ValueError(f"no such backend; {guess}one of {', '.join((*names, *addresses))}")
 
 
+def backends_for(backend: str) -> tuple[BackendDeclaration, ...]:
+    """Return what `--backend` asks for, `a+b` for several that judge every frame. Raises ValueError as `backend_for`
+    does, and for one that is asked for twice."""
+    names = backend.split(AND)
+    if len(names) > 1 and AUTO in names:
+        raise ValueError(f"`{AUTO}` is one backend; name those that are to be used together")
+    if len(set(names)) < len(names):
+        raise ValueError("names a backend twice; several networks of one backend are a folder of --weights")
+    return tuple(backend_for(name) for name in names)
+
+
 def automatic(weights: Path | None) -> BackendDeclaration:
     """Return the backend that `auto` takes with these weights, or with none: a detector taught on photographs before
     our own network, which was taught in generated rooms."""
-    without_detector = weights is None or weights.suffix == ".safetensors"
-    return backend_for(AUTO if without_detector else "detector")
+    if weights is None or weights.suffix == ".safetensors":
+        return backend_for(AUTO)
+    return backend_for("tflite" if weights.suffix == ".tflite" else "detector")
 
 
 def usual_detector(parameters: Any, given: Mapping[str, Any]) -> str:
@@ -112,8 +135,10 @@ def usual_witness(parameters: Any, given: Mapping[str, Any]) -> str:
 
 def check_backend(backend: str) -> str:
     """Return the name of a backend, or an address without its closing slash. Raises ValueError."""
-    declared = backend_for(backend)
-    return check_address(backend, form=declared.address) if declared.address else backend
+    return AND.join(
+        check_address(name, form=declared.address) if declared.address else name
+        for name, declared in zip(backend.split(AND), backends_for(backend), strict=True)
+    )
 
 
 def backend_help() -> str:
@@ -122,9 +147,10 @@ def backend_help() -> str:
     addresses = [f"or {declared.address}" for declared in all_backends() if declared.address]
     unasked = (
         f"`{AUTO}`: `detector` where --weights is an ONNX file or the cache of models has yolox_nano (`scenewright "
-        f"models`), else what needs nothing: `{backend_for(AUTO).name}`"
+        f"models`), `tflite` where they are a .tflite file, else what needs nothing: `{backend_for(AUTO).name}`"
     )
-    return "; ".join([*summaries, unasked, *addresses])
+    several = "`a+b`: each of them, and what they agree on"
+    return "; ".join([*summaries, unasked, several, *addresses])
 
 
 def weights_help() -> str:
@@ -138,7 +164,8 @@ def weights_help() -> str:
 
 def data_files(parameters: Any) -> tuple[str, ...]:
     """Return the files of data/ that the backend of the parameters reads."""
-    return backend_for(parameters.backend).data_files(parameters)
+    backends = _may_run(parameters.backend)
+    return tuple(dict.fromkeys(file for declared in backends for file in declared.data_files(parameters)))
 
 
 def versions(parameters: Any) -> dict[str, str]:
@@ -146,7 +173,14 @@ def versions(parameters: Any) -> dict[str, str]:
 
     Raises MissingDependency or BadInput when a backend has to ask for that and is not answered.
     """
-    declared = backend_for(parameters.backend)
-    further: dict[str, str] = declared.load(declared.versions).versions(parameters) if declared.versions else {}
-    backends = (declared, backend_for("detector")) if parameters.backend == AUTO else (declared,)
-    return {name: library_version(name) for backend in backends for name in backend.libraries} | further
+    backends = _may_run(parameters.backend)
+    found = {name: library_version(name) for declared in backends for name in declared.libraries}
+    for declared in backends:
+        if declared.versions:
+            found |= declared.load(declared.versions).versions(parameters)
+    return found
+
+
+def _may_run(backend: str) -> tuple[BackendDeclaration, ...]:
+    """Return what `--backend` may come to, before the weights are known."""
+    return tuple(map(backend_for, (AUTO, "detector", "tflite"))) if backend == AUTO else backends_for(backend)

@@ -14,7 +14,7 @@ from scenewright.stages.kit.formats.frames import FrameReader, require_depth
 from scenewright.stages.kit.formats.masks import write_panoptic_zip
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.segment.apart import segmented_apart, segmented_here, worker_count
-from scenewright.stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
+from scenewright.stages.segment.choice import BackendRequest, choose_backend, chosen_backends, fitting
 from scenewright.stages.segment.parameters import SegmentParameters
 
 
@@ -55,7 +55,9 @@ def run(
             backend = choose_backend(request)
         annotations: list[FrameSegments] = []
         streams = tuple(dict.fromkeys(("depth", *backend.streams)))
-        workers = worker_count(len(reader), chosen_backend(request).apart, context.device)
+        workers = worker_count(
+            len(reader), all(declared.apart for declared in chosen_backends(request)), context.device
+        )
 
         def images() -> Iterator[tuple[int, np.ndarray | bytes]]:
             segmented = (
@@ -76,6 +78,7 @@ def run(
         label=backend.label,
         corruption=getattr(backend, "corruption", 0.0),
         recognised=recognised,
+        networks=tuple(getattr(backend, "networks", ())) if len(getattr(backend, "networks", ())) > 1 else (),
         width=info.camera.width,
         height=info.camera.height,
         frames=tuple(annotations),

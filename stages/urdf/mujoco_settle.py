@@ -31,11 +31,12 @@ def mujoco_motions(
     path = folder / MJCF_FILE
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
-        data = mujoco.MjData(model)
-        names = [body.name for body in scene.bodies if body.movable]
-        numbers = [model.body(name).id for name in names]
-    except (ValueError, KeyError) as error:
+    except ValueError as error:
         raise BadInput(f"{path}: MuJoCo does not load it: {error}", hint="run `urdf` again") from None
+    data = mujoco.MjData(model)
+    _check_names(path, model, scene)
+    names = [body.name for body in scene.bodies if body.movable]
+    numbers = [model.body(name).id for name in names]
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, model.key(KEY_FRAME).id)
     mujoco.mj_forward(model, data)
@@ -57,6 +58,22 @@ def mujoco_motions(
             )
         )
     return tuple(motions)
+
+
+def _check_names(path: Path, model: Any, scene: InteractiveSceneFile) -> None:
+    """Raise BadInput where a file lacks a body of scene.json that is asked for, or the key frame: of another run."""
+    bodies = {model.body(number).name for number in range(model.nbody)}
+    lacking = [
+        one.name for one in scene.bodies if (one.movable or one.class_name == "floor") and one.name not in bodies
+    ]
+    if lacking:
+        more = f" and {len(lacking) - 3} more" if len(lacking) > 3 else ""
+        raise BadInput(
+            f"{path}: there is no body {', '.join(lacking[:3])}{more}, which scene.json names", hint="run `urdf` again"
+        )
+    keys = [model.key(number).name for number in range(model.nkey)]
+    if keys and KEY_FRAME not in keys:
+        raise BadInput(f"{path}: there is no key frame {KEY_FRAME}, only {', '.join(keys)}", hint="run `urdf` again")
 
 
 def _pose(data: Any, number: int) -> tuple[np.ndarray, np.ndarray]:

@@ -75,6 +75,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/kit/exports.py": {"read_text": OURS},
     "stages/kit/formats/mosd_frames.py": {"cv2.imread": PICTURE},
     "stages/kit/training/run.py": {"json.loads": MADE, "read_text": MADE},
+    "stages/segment/networks/metadata.py": {"zipfile.ZipFile": PARSED},
     "stages/segment/training/network/samples.py": {"json.loads": TAUGHT, "read_text": TAUGHT},
     "stages/splat/training/word_probabilities/asked_places.py": {"json.loads": TAUGHT, "read_text": TAUGHT},
     "stages/splat/training/words/lexicon.py": {"read_text": OURS, "tomllib.loads": OURS},

@@ -24,7 +24,7 @@ from scenewright.stages.kit.services.segmentation_protocol import (
     parse_reply,
     parse_request,
 )
-from scenewright.stages.segment.backends.onnx.sidecar import read_sidecar
+from scenewright.stages.segment.networks.sidecar import read_sidecar
 
 from tests.fuzz.harness import Harness, as_file, refused
 

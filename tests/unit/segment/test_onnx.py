@@ -11,10 +11,10 @@ import pytest
 from scenewright.schemas.errors import BadInput, MissingDependency
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.frames import Frame
-from scenewright.stages.segment.backends.onnx.decoding import _paste_mask
-from scenewright.stages.segment.backends.onnx.network import fit
-from scenewright.stages.segment.backends.onnx.sidecar import Sidecar, find_layout, read_sidecar
 from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.networks.decoding import _paste_mask
+from scenewright.stages.segment.networks.fitting import fit
+from scenewright.stages.segment.networks.sidecar import Sidecar, find_layout, read_sidecar
 from scenewright.stages.segment.parameters import SegmentParameters
 
 onnx = pytest.importorskip("onnx")
@@ -233,6 +233,7 @@ def test_layouts() -> None:
 def test_bad_files(tmp_path: Path) -> None:
     with pytest.raises(MissingDependency, match="needs a network"):
         choose_backend(BackendRequest(SegmentParameters(backend="onnx")))
+    (tmp_path / "empty").mkdir()
     garbage = tmp_path / "garbage.onnx"
     garbage.write_bytes(b"\x08\x07garbage")
     sound = panoptic_network(tmp_path / "sound.onnx")
@@ -244,7 +245,7 @@ def test_bad_files(tmp_path: Path) -> None:
         (garbage, "no ONNX network"),
         (torn, "no ONNX network"),
         (odd, "no known layout"),
-        (tmp_path, "no ONNX file"),
+        (tmp_path / "empty", "holds no network"),
     ):
         with pytest.raises(BadInput, match=text) as caught:
             found_by(weights)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.segment.backends.onnx.network import STEP, Network
-from scenewright.stages.segment.backends.onnx.sidecar import find_layout, misfit, only_boxes, read_sidecar
+from scenewright.stages.segment.networks.fitting import STEP
+from scenewright.stages.segment.networks.onnx_network import OnnxNetwork
+from scenewright.stages.segment.networks.sidecar import find_layout, misfit, only_boxes, read_sidecar
 
 from tests.unit.segment import test_onnx as known
 from tests.unit.segment.test_onnx import HEIGHT, WIDTH, colored, found_by, given, image, joined, pixels_of, save
@@ -110,7 +111,7 @@ def test_a_sidecar_says_only_what_is_not_as_usual(tmp_path: Path) -> None:
 def test_networks_of_any_size_get_a_size_that_they_can_take(tmp_path: Path, size: Any, imgsz: str | None) -> None:
     metadata = {**NAMES, **({"imgsz": imgsz} if imgsz else {})}
     weights = end_to_end(tmp_path / "e2e.onnx", size=size, metadata=metadata)
-    network = Network(weights, None, "cpu")
+    network = OnnxNetwork(weights, None, "cpu")
     fitted = network.fit(image())
     expected = (64, 64) if imgsz is None or size[0] == 64 else (64, 96)
     assert fitted.tensor.shape[-2:] == expected and all(side % STEP == 0 for side in expected)
@@ -263,7 +264,7 @@ def test_networks_that_give_boxes_alone_are_named(shapes: dict[str, tuple[int, .
     ("shape", "message", "hint"),
     [
         ((1, 300, 6), r"gives boxes without masks \(output0 \(1, 300, 6\)\)", "yolo11n-seg.pt"),
-        ((1, 21, 8, 8), "gives a class for each pixel, no instances", "--backend masks"),
+        ((1, 3, 8, 8), "nothing says what its 3 classes are", 'layout = "semantic"'),
         ((1, 7), "of no known layout", "--backend masks"),
     ],
 )

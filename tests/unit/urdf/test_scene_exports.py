@@ -179,6 +179,32 @@ def test_mujoco_finds_what_falls_through(scene: Path) -> None:
 
 def test_a_scene_that_mujoco_does_not_load_is_bad_input(scene: Path) -> None:
     pytest.importorskip("mujoco")
-    (scene / "scene.mjcf.xml").write_text("<mujoco><worldbody/></mujoco>")
+    (scene / "scene.mjcf.xml").write_text("<mujoco><worldbody/>")
     with pytest.raises(BadInput, match="MuJoCo does not load it"):
+        mujoco_motions(scene, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('body name="floor_1"', 'body name="floor_9"', "there is no body floor_1, which scene.json names"),
+        ('body name="cup_5"', 'body name="cup_9"', "there is no body cup_5, which scene.json names"),
+        ('key name="reconstructed"', 'key name="home"', "there is no key frame reconstructed, only home"),
+    ],
+)
+def test_a_file_of_another_run_is_bad_input(scene: Path, old: str, new: str, said: str) -> None:
+    pytest.importorskip("mujoco")
+    path = scene / "scene.mjcf.xml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(BadInput, match=said) as raised:
+        mujoco_motions(scene, 0.1)
+    assert raised.value.hint == "run `urdf` again"
+
+
+def test_a_file_without_any_of_many_bodies_says_how_many(scene: Path) -> None:
+    pytest.importorskip("mujoco")
+    (scene / "scene.mjcf.xml").write_text("<mujoco><worldbody/></mujoco>")
+    with pytest.raises(BadInput, match="there is no body [a-z0-9_, ]+ and 1 more, which scene.json names"):
         mujoco_motions(scene, 0.1)

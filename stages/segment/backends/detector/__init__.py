@@ -2,18 +2,8 @@
 
 from __future__ import annotations
 
-from pydantic import Field
-from scenewright.stages.kit.stage import Extra, Parameters
-from scenewright.stages.segment.registry import BackendDeclaration
-
-
-class DetectorParameters(Parameters):
-    """Options of the backend `detector`."""
-
-    tiles: bool = Field(
-        True, description="Detect on overlapping tiles at full resolution too (finds small things, five times slower)"
-    )
-
+from scenewright.stages.kit.labels import LABEL_TABLES
+from scenewright.stages.segment.registry import LITERT, RUNTIMES, BackendDeclaration
 
 BACKEND = BackendDeclaration(
     name="detector",
@@ -22,7 +12,9 @@ BACKEND = BackendDeclaration(
     apart=True,
     needs=frozenset({"color"}),
     weights="an ONNX file",
-    parameters=DetectorParameters,
-    libraries=("ai-edge-litert",),
-    extras=(Extra("ai-edge-litert", "ai_edge_litert", "segment --semantic-weights: pip install ai-edge-litert"),),
+    endings=(".onnx",),
+    takes=frozenset({"tiles", "semantic_weights"}),
+    libraries=RUNTIMES,
+    extras=(LITERT,),
+    data_files=lambda parameters: LABEL_TABLES,
 )

@@ -10,15 +10,14 @@ from scenewright.schemas.sequence import SequenceFile
 from scenewright.schemas.vocabulary import UNNAMED, SemanticClass, Vocabulary, load_vocabulary
 from scenewright.stages.kit.class_extents import extent_of, is_plausible
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
-from scenewright.stages.segment.backends.detector import DetectorParameters
 from scenewright.stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
 from scenewright.stages.segment.backends.detector.box_masks import box_mask, frame_geometry
 from scenewright.stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
-from scenewright.stages.segment.backends.detector.semantic import FROM_VOC, VOC_NAMES, SemanticSegmenter
 from scenewright.stages.segment.backends.detector.yolox import Detections, Detector
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.coco import COCO_NAMES
 from scenewright.stages.segment.geometric import GeometricFrame, GeometricSettings, pixels_at, segment_depth
+from scenewright.stages.segment.networks.semantic import SemanticSegmenter, open_segmenter
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 from scenewright.stages.segment.settings import geometric_settings
 
@@ -64,7 +63,9 @@ class DetectorBackend:
         self._witness = witness
         self._threshold = threshold
         self._known = {
-            number: vocabulary.by_name(FROM_VOC[name]) for number, name in enumerate(VOC_NAMES) if name in FROM_VOC
+            number: vocabulary.by_name(label.class_name)
+            for number, label in (witness.labels if witness else {}).items()
+            if label.class_name
         }
         self._detector = detector
         self._classes = [vocabulary.by_alias(name, "coco") for name in COCO_NAMES]
@@ -178,13 +179,15 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
     label = f"detector {request.weights.stem} + geometric segments"
     witness, score_threshold = None, parameters.score_threshold
     if request.semantic_weights is not None:
-        witness, score_threshold = SemanticSegmenter(request.semantic_weights), HEARD * parameters.score_threshold
+        witness = open_segmenter(request.semantic_weights, device=request.device)
+        score_threshold = HEARD * parameters.score_threshold
         label = f"detector {request.weights.stem}, witnessed by {request.semantic_weights.stem}, + geometric segments"
     detector = Detector(
         request.weights,
         score_threshold=score_threshold,
         suppression_overlap=parameters.suppression_overlap,
-        tile_side=min(reader.camera.width, reader.camera.height) if request.own(DetectorParameters).tiles else 0,
+        tile_side=min(reader.camera.width, reader.camera.height) if parameters.tiles is None else 0,
+        tiles=parameters.tiles or 0,
     )
     return DetectorBackend(
         sequence.info,

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scenewright.schemas.errors import BadInput, MissingDependency
+from scenewright.schemas.errors import BadInput
 from scenewright.stages.segment.coco import COCO_NAMES
+from scenewright.stages.segment.networks.fitting import PAD_VALUE
+from scenewright.stages.segment.networks.tiles import INNER_MARGIN, Window, grid_windows
 from scenewright.stages.segment.suppression import suppress
 
 STRIDES = (8, 16, 32)
 """Input pixels per cell of each of the network's three grids (YOLOX, Ge et al. 2021)."""
-PAD_VALUE = 114
-"""Grey with which a picture is padded to a square, as YOLOX was trained (0..255)."""
 INPUT_SIZES = (416, 640)
 """Square inputs of the published YOLOX models (nano and tiny; small to extra large)."""
 
@@ -60,7 +60,7 @@ def decode(raw: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([center - half, center + half], axis=1), raw[:, 4:5] * raw[:, 5:]
 
 
-def tile_windows(width: int, height: int, side: int) -> list[tuple[int, int, int, int]]:
+def tile_windows(width: int, height: int, side: int) -> list[Window]:
     """Return windows (x0, y0, x1, y1) of `side` pixels that cover an image, neighbours overlapping by at least a
     third of a side; none when the image is not larger than a tile."""
     if width <= side and height <= side:
@@ -76,19 +76,19 @@ def tile_windows(width: int, height: int, side: int) -> list[tuple[int, int, int
 
 
 class Detector:
-    """A YOLOX network. Raises MissingDependency when the file is absent, BadInput when it is no such network."""
+    """A YOLOX network. Raises BadInput when the file is no such network."""
 
-    def __init__(self, weights: Path, *, score_threshold: float, suppression_overlap: float, tile_side: int) -> None:
+    def __init__(
+        self, weights: Path, *, score_threshold: float, suppression_overlap: float, tile_side: int, tiles: int = 0
+    ) -> None:
+        """`tile_side` [pixels]: of tiles at full resolution, 0 = none; `tiles`: how many a side there are otherwise."""
         weights = Path(weights)
-        if not weights.is_file():
-            raise MissingDependency(
-                f"detector weights {weights} are not there",
-                hint="give an ONNX export of a YOLOX model (COCO-80) with --weights, or use --backend geometric",
-            )
         self.score_threshold = score_threshold
         self.suppression_overlap = suppression_overlap
-        self.tile_side = tile_side
-        hint = "give an ONNX export of a YOLOX model (COCO-80) with --weights"
+        self.tile_side, self.tiles = tile_side, tiles
+        hint = (
+            "give an ONNX export of a YOLOX model (COCO-80) with --weights, or --backend onnx for one that gives masks"
+        )
         try:
             self._network = cv2.dnn.readNetFromONNX(str(weights))
         except (cv2.error, MemoryError) as error:
@@ -109,18 +109,17 @@ class Detector:
         return 0
 
     def detect(self, color: np.ndarray) -> Detections:
-        """Return what is found in an image (H, W, 3) uint8 RGB: in the whole, and in tiles when `tile_side` > 0."""
+        """Return what is found in an image (H, W, 3) uint8 RGB: in the whole, and in tiles if it was asked to."""
         height, width = color.shape[:2]
-        windows = [self._detect_window(color, (0, 0, width, height))]
+        areas = grid_windows(width, height, self.tiles)
         if self.tile_side:
-            windows += [self._detect_window(color, window) for window in tile_windows(width, height, self.tile_side)]
+            areas += tile_windows(width, height, self.tile_side)
+        windows = [self._detect_window(color, area) for area in areas]
         boxes, scores, classes = (np.concatenate([part[k] for part in windows]) for k in range(3))
         unsuppressed = suppress(boxes, scores, classes, self.suppression_overlap)
         return Detections(boxes[unsuppressed], scores[unsuppressed], classes[unsuppressed])
 
-    def _detect_window(
-        self, color: np.ndarray, window: tuple[int, int, int, int]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _detect_window(self, color: np.ndarray, window: Window) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         height, width = color.shape[:2]
         x0, y0, x1, y1 = window
         # The network was trained on blue-green-red values 0..255.
@@ -133,7 +132,7 @@ class Detector:
         limits = np.array([x1 - x0, y1 - y0] * 2, dtype=np.float32)
         boxes = np.clip(boxes[keep] / scale, 0, limits) + np.array([x0, y0, x0, y0], dtype=np.float32)
         # A box cut off by the side of a tile that is not the image's own says nothing of the thing's extent.
-        margin = 0.015 * (x1 - x0)
+        margin = INNER_MARGIN * (x1 - x0)
         cut = (
             ((boxes[:, 0] < x0 + margin) & (x0 > 0))
             | ((boxes[:, 1] < y0 + margin) & (y0 > 0))

@@ -11,6 +11,7 @@ BACKEND = BackendDeclaration(
     apart=True,
     automatic=True,
     weights="a .safetensors checkpoint of our own, where the one that comes with the project is not wanted",
+    endings=(".safetensors",),
     libraries=("torch",),
     data_files=lambda parameters: ("networks/panoptic.safetensors",),
 )

@@ -1,18 +1,20 @@
-"""Backend `onnx`: instance and panoptic networks as ONNX files, run by ONNX Runtime."""
+"""Backend `onnx`: instance, panoptic and semantic networks as ONNX files, run by ONNX Runtime."""
 
 from __future__ import annotations
 
 from scenewright.stages.kit.labels import LABEL_TABLES
 from scenewright.stages.kit.stage import Extra
-from scenewright.stages.segment.registry import BackendDeclaration
+from scenewright.stages.segment.registry import RUNTIMES, BackendDeclaration
 
 BACKEND = BackendDeclaration(
     name="onnx",
-    summary="an ONNX instance or panoptic network",
+    summary="an ONNX instance, panoptic or semantic network",
     order=70,
     needs=frozenset({"color"}),
     weights="an ONNX file",
-    libraries=("onnxruntime",),
+    endings=(".onnx",),
+    takes=frozenset({"tiles", "semantic_weights"}),
+    libraries=RUNTIMES,
     extras=(Extra("onnxruntime", "onnxruntime", "segment --backend onnx: pip install onnxruntime"),),
     data_files=lambda parameters: LABEL_TABLES,
 )

@@ -29,8 +29,8 @@ from scenewright.stages.kit.services.segmentation_protocol import (
     encode_reply,
     parse_request,
 )
-from scenewright.stages.segment.choice import Backend
 from scenewright.stages.segment.geometric import GeometricSettings, segment_depth
+from scenewright.stages.segment.panoptic import Backend
 
 MOST_WAITING = 16
 """Requests that may wait for the model; more are told to come back."""

@@ -11,7 +11,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.segment.backends.network.backend import camera_of_points, shows_something
-from scenewright.stages.segment.choice import BackendRequest, choose_backend, chosen_backend, fitting
+from scenewright.stages.segment.choice import BackendRequest, choose_backend, chosen_backends, fitting
 from scenewright.stages.segment.parameters import SegmentParameters
 
 from tests.unit.segment.network.test_weights import tiny_checkpoint
@@ -82,13 +82,13 @@ def test_night_and_lens_caps_show_nothing() -> None:
 def test_auto_takes_no_detector_for_a_log_without_colour(room: Written, tmp_path: Path) -> None:
     parameters = SegmentParameters(backend="auto")
     asked = BackendRequest(parameters, weights=tmp_path / "yolox.onnx", sequence=room.sequence)
-    assert fitting(asked).weights == asked.weights and chosen_backend(fitting(asked)).name == "detector"
+    assert fitting(asked).weights == asked.weights and chosen_backends(fitting(asked))[0].name == "detector"
     dark = Sequence(tmp_path / "dark")
     (tmp_path / "dark").mkdir()
     streams = tuple(name for name in room.sequence.info.streams if name != "color")
     room.sequence.info.model_copy(update={"streams": streams}).write(dark.path("sequence.json"))
     fitted = fitting(BackendRequest(parameters, weights=tmp_path / "yolox.onnx", sequence=dark))
-    assert fitted.weights is None and chosen_backend(fitted).name == "network"
+    assert fitted.weights is None and chosen_backends(fitted)[0].name == "network"
 
 
 def test_the_camera_of_points_is_found_again() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.segment.backends.detector.semantic import VOC_NAMES
+from scenewright.stages.kit.labels import load_label_set
 from scenewright.stages.segment.backends.masks.classes import lines_of, read_classes
 from scenewright.stages.segment.backends.masks.given import (
     Category,
@@ -49,7 +49,7 @@ def open_source(listing: Listing) -> MaskSource | None:
     else:
         given, divisor = read_classes(listing)
         colors = {color: index for index, color in enumerate(voc_colors(RIM + 1))}
-        categories = given or {number: Category(name) for number, name in enumerate(VOC_NAMES)}
+        categories = given or {0: Category("background"), **voc_categories()}
     source = label_map.name if label_map else listing.class_source() if given else "PASCAL VOC's classes"
 
     def read(place: int, shape: tuple[int, int], settings: ReadSettings) -> GivenFrame:
@@ -62,6 +62,11 @@ def open_source(listing: Listing) -> MaskSource | None:
 
     lacks = ("scores", "overlaps")
     return MaskSource(tuple(picture_of_file(file, listing.root) for file in files), categories, read, lacks)
+
+
+def voc_categories() -> dict[int, Category]:
+    """Return number -> class of PASCAL VOC."""
+    return {label.id: Category(label.name) for label in load_label_set("pascal-voc").labels if label.id is not None}
 
 
 def read_label_map(path: Path) -> tuple[dict[int, int], dict[int, Category]]:

@@ -1,8 +1,8 @@
-"""What goes into an ONNX network and what comes out: said by a TOML beside it, or found out from its outputs."""
+"""What goes into a network and what comes out: said by a TOML beside it, or found out from its outputs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,7 +11,11 @@ from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, first_problem
 from scenewright.schemas.outside import file_toml
 
-Layout = Literal["yolo-seg", "yolo-objectness", "yolo-end-to-end", "instances", "query-instances", "panoptic"]
+Layout = Literal[
+    "yolo-seg", "yolo-objectness", "yolo-end-to-end", "instances", "query-instances", "panoptic", "semantic"
+]
+HINT = "say what goes in and what comes out with --sidecar FILE.toml (docs/SEGMENTATION.md)"
+BY_FOLDER = "run it in a script of your own and give its masks with --backend masks (docs/MASKS.md)"
 LARGEST_FILE = 2**20
 """Most bytes of a sidecar."""
 END_TO_END = 6
@@ -28,6 +32,7 @@ OUTPUTS: Mapping[str, tuple[str, ...]] = {
     "instances": ("boxes", "labels", "scores", "masks"),
     "query-instances": ("classes", "masks"),
     "panoptic": ("classes", "masks"),
+    "semantic": ("classes",),
 }
 """Layout -> roles of its outputs. `instances` needs no `scores` where boxes have them as a fifth column."""
 SHAPES: Mapping[str, str] = {
@@ -37,6 +42,7 @@ SHAPES: Mapping[str, str] = {
     "instances": "boxes (N, 4 or 5), labels (N,), scores (N,), masks (N, [1,] h, w)",
     "query-instances": "classes (1, Q, C), masks (1, Q, h, w)",
     "panoptic": "classes (1, Q, C+1), masks (1, Q, h, w)",
+    "semantic": "classes (1, C, h, w) or (1, h, w, C) scores, or (1, h, w) numbers",
 }
 """Layout -> what its outputs look like, for messages."""
 KNOWN_NAMES = {
@@ -52,14 +58,14 @@ KNOWN_NAMES = {
 
 
 class Sidecar(Model):
-    """How to use an ONNX network."""
+    """How to use a network."""
 
     layout: Layout
     outputs: dict[str, str]
     """Role -> name of the output."""
     labels: str | tuple[str, ...] = ""
-    """A label set (`coco-80`, `coco-panoptic`, `ade20k`, `scenewright`), or the names in the network's order; empty:
-    by the network's own metadata or the number of its classes."""
+    """A label set (`coco-80`, `coco-panoptic`, `ade20k`, `ade20k-31`, `pascal-voc`, `scenewright`), or the names in the
+    network's order; empty: by the network's own metadata or the number of its classes."""
     numbering: Literal["position", "id"] = "position"
     """`id`: the network gives out the ids of the label set, not positions."""
     size: tuple[int, int] | None = None
@@ -79,12 +85,13 @@ IMAGENET_MEAN, IMAGENET_DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Mean and standard deviation of ImageNet's pictures (R, G, B of 0..1), by which most networks were trained."""
 
 
+IMAGENET: Mapping[str, Any] = {"mean": IMAGENET_MEAN, "deviation": IMAGENET_DEVIATION}
 INPUTS: Mapping[str, Mapping[str, Any]] = {
     "yolo-seg": {"resize": "letterbox"},
     "yolo-objectness": {"resize": "letterbox"},
     "yolo-end-to-end": {"resize": "letterbox"},
-    "query-instances": {"mean": IMAGENET_MEAN, "deviation": IMAGENET_DEVIATION},
-    "panoptic": {"mean": IMAGENET_MEAN, "deviation": IMAGENET_DEVIATION},
+    "query-instances": IMAGENET,
+    "panoptic": IMAGENET,
 }
 """Layout -> what goes in, where a sidecar does not say it."""
 
@@ -110,14 +117,21 @@ def read_sidecar(path: Path) -> Sidecar:
     return sidecar
 
 
-def find_layout(shapes: Mapping[str, tuple[int, ...]], classes: int = 0) -> Sidecar | None:
+def find_layout(
+    shapes: Mapping[str, tuple[int, ...]], classes: int = 0, whole_numbers: Collection[str] = ()
+) -> Sidecar | None:
     """Return how to use a network by the names and shapes of what it gave for one image; None when it is not known.
 
-    `classes` is how many the file's metadata names, 0 for none. Known: YOLO segmentation, raw (boxes, class scores and
-    mask coefficients beside prototypes), with objectness (the same row by row, as YOLOv5 and YOLOv7 write it) and end
-    to end (boxes with score, class and coefficients), Mask R-CNN of torchvision, Detectron2 and MMDeploy and RF-DETR by
-    their names, and queries with class logits and mask logits (Mask2Former, DETR and their kind).
+    `classes` is how many the file's metadata names, 0 for none; `whole_numbers` are the outputs that hold such. Known:
+    YOLO segmentation, raw (boxes, class scores and mask coefficients beside prototypes), with objectness (the same row
+    by row, as YOLOv5 and YOLOv7 write it) and end to end (boxes with score, class and coefficients), Mask R-CNN of
+    torchvision, Detectron2 and MMDeploy and RF-DETR by their names, queries with class logits and mask logits
+    (Mask2Former, DETR and their kind), and semantic networks: scores of classes for every pixel, or the number of its
+    class (DeepLab, SegFormer; torchvision's `out` and `aux`).
     """
+    pixels = "out" if set(shapes) == {"out", "aux"} else next(iter(shapes)) if len(shapes) == 1 else ""
+    if pixels and _is_semantic(shapes[pixels], pixels in whole_numbers):
+        return Sidecar(layout="semantic", outputs={"classes": pixels})
     roles = {KNOWN_NAMES[name]: name for name in shapes if name in KNOWN_NAMES}
     if set(roles) == set(OUTPUTS["instances"]):
         detectron = "pred_classes" in shapes
@@ -155,6 +169,30 @@ def find_layout(shapes: Mapping[str, tuple[int, ...]], classes: int = 0) -> Side
     return None
 
 
+def _is_semantic(shape: tuple[int, ...], whole_numbers: bool) -> bool:
+    """Whether an output of one image says something of every pixel; scores have at least two classes."""
+    if whole_numbers:
+        return (len(shape) == 3 or (len(shape) == 4 and 1 in (shape[1], shape[3]))) and sorted(shape)[-2] > 1
+    return len(shape) == 4 and min(shape[1:]) > 1
+
+
+def channels_axis(shape: tuple[int, ...], size: tuple[int, int], otherwise: int) -> int:
+    """Return which axis, 1 or 3, of an output (1, C, h, w) or (1, h, w, C) of a picture has the channels.
+
+    `size` (width, height) of the input: h and w are by the same factor smaller. `otherwise`: what holds where that
+    does not tell.
+    """
+    wide, high = size
+    fits = {axis: shape[s] * wide == shape[s + 1] * high for axis, s in ((1, 2), (3, 1))}
+    return otherwise if fits[1] == fits[3] else 1 if fits[1] else 3
+
+
+def with_values(sidecar: Sidecar, **values: Any) -> Sidecar:
+    """Return the sidecar with scale, mean or deviation of `values` where nobody said any of them."""
+    told = {"scale", "mean", "deviation"} & sidecar.model_fields_set
+    return sidecar if told else sidecar.model_copy(update=values)
+
+
 def _known(layout: Layout, **outputs: str) -> Sidecar:
     return Sidecar(layout=layout, outputs=outputs, **INPUTS[layout])
 
@@ -174,6 +212,9 @@ def misfit(layout: str, shapes: Mapping[str, tuple[int, ...]]) -> str:
                 return f"these are the shapes of {other}"
             if end_to_end or first[1] > 4 + second[1]:
                 return ""
+    elif layout == "semantic":
+        if len(shapes["classes"]) in (3, 4) and shapes["classes"][0] == 1:
+            return ""
     elif layout == "instances":
         if shapes["boxes"][-1:] == ((4,) if "scores" in shapes else (5,)):
             return ""
@@ -190,3 +231,35 @@ def only_boxes(shapes: Mapping[str, tuple[int, ...]]) -> bool:
     return all(len(shape) <= 3 for shape in shapes.values()) and any(
         shape[-1:] in ((4,), (5,)) for shape in shapes.values()
     )
+
+
+def unknown(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> BadInput:
+    """Return the error for a network whose outputs are of no known layout."""
+    shapes_text = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+    if only_boxes(shapes):
+        return BadInput(
+            f"{path.name}: gives boxes without masks ({shapes_text:.200})",
+            hint=f"export a segmentation network instead (yolo export model=yolo11n-seg.pt format={path.suffix[1:]}); "
+            "of networks that give boxes, --backend detector takes YOLOX",
+        )
+    layouts = "; ".join(f"{name}: {text}" for name, text in SHAPES.items())
+    return BadInput(
+        f"{path.name}: its outputs ({shapes_text:.200}) are of no known layout",
+        hint=f"if it is one of these, {HINT}: {layouts}. Else {BY_FOLDER}",
+    )
+
+
+def roles_of(path: Path, sidecar: Sidecar, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+    """Return role -> shape of the outputs that a sidecar names. Raises BadInput when one is not there or does not
+    fit."""
+    missing = [name for name in sidecar.outputs.values() if name not in shapes]
+    if missing:
+        raise BadInput(f"{path.name}: has no output {missing[0]!r:.60}", hint=f"it has: {', '.join(shapes)}")
+    by_role = {role: shapes[name] for role, name in sidecar.outputs.items()}
+    wrong = misfit(sidecar.layout, by_role)
+    if wrong:
+        shapes_text = ", ".join(f"{role} {shape}" for role, shape in by_role.items())
+        raise BadInput(
+            f"{path.name}: gives {shapes_text:.200}; {wrong}", hint="correct `layout` or `outputs` in the sidecar"
+        )
+    return by_role

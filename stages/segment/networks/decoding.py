@@ -3,19 +3,21 @@ finite is dropped."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scenewright.stages.segment.backends.onnx.network import Fitted
-from scenewright.stages.segment.backends.onnx.sidecar import END_TO_END, OBJECTNESS
+from scenewright.stages.segment.networks.fitting import Fitted
+from scenewright.stages.segment.networks.sidecar import END_TO_END, OBJECTNESS
 from scenewright.stages.segment.suppression import suppress
 
 MOST_CANDIDATES = 300
 """Instances of one image that are looked at, the best scored."""
 MASK_THRESHOLD = 0.5
 """Least probability of a mask's pixel; the published networks' own."""
+LARGEST_SHARE = 2.0
+"""Boxes given in shares of the input's sides are not larger than this."""
 OVERLAP_SHARE = 0.8
 """A panoptic segment of which others leave less than this is dropped (Cheng et al. 2022)."""
 
@@ -29,6 +31,56 @@ class Found:
     score: float
 
 
+def instances_of(
+    layout: str,
+    outputs: Mapping[str, np.ndarray],
+    fitted: Fitted,
+    shape: tuple[int, int],
+    *,
+    score_threshold: float,
+    suppression_overlap: float,
+) -> list[Found]:
+    """Return the instances in an image of `shape` (H, W) from what a network of any layout of instances gave, by role.
+
+    `suppression_overlap`: for layouts whose boxes are not suppressed yet.
+    """
+    if layout in ("yolo-seg", "yolo-objectness"):
+        raw = yolo_seg if layout == "yolo-seg" else yolo_objectness
+        return raw(
+            outputs["predictions"],
+            outputs["prototypes"],
+            fitted,
+            shape,
+            score_threshold=score_threshold,
+            suppression_overlap=suppression_overlap,
+        )
+    if layout == "yolo-end-to-end":
+        return yolo_end_to_end(
+            outputs["predictions"], outputs["prototypes"], fitted, shape, score_threshold=score_threshold
+        )
+    if layout == "query-instances":
+        return query_instances(outputs["classes"], outputs["masks"], fitted, shape, score_threshold=score_threshold)
+    return instances(
+        outputs["boxes"],
+        outputs["labels"],
+        outputs.get("scores"),
+        outputs["masks"],
+        fitted,
+        shape,
+        score_threshold=score_threshold,
+    )
+
+
+def in_pixels(rows: np.ndarray, fitted: Fitted) -> np.ndarray:
+    """Return rows (N, 4 + ...) whose first four columns are pixels of the input: exports for TensorFlow Lite give
+    shares of its sides. The cells of a network cover its input, so that pixels go far beyond LARGEST_SHARE."""
+    boxes = rows[:, :4]
+    if not rows.size or np.max(boxes, initial=0, where=np.isfinite(boxes)) > LARGEST_SHARE:
+        return rows
+    height, width = fitted.tensor.shape[-2:]
+    return np.concatenate([boxes * np.array([width, height] * 2, np.float32), rows[:, 4:]], axis=1)
+
+
 def yolo_seg(
     predictions: np.ndarray,
     prototypes: np.ndarray,
@@ -40,11 +92,12 @@ def yolo_seg(
 ) -> list[Found]:
     """Return the instances of a YOLO segmentation network in an image of `shape` (H, W).
 
-    `predictions` (1, 4 + C + M, N): centre x, y, width, height [input pixels], a score 0..1 per class, M mask
-    coefficients; `prototypes` (1, M, h, w). A mask is the sigmoid of coefficients times prototypes, cut by its box.
+    `predictions` (1, 4 + C + M, N): centre x, y, width, height [input pixels, or shares of the input's sides], a score
+    0..1 per class, M mask coefficients; `prototypes` (1, M, h, w). A mask is the sigmoid of coefficients times
+    prototypes, cut by its box.
     """
     count = prototypes.shape[1]
-    rows = predictions[0].T.astype(np.float32)
+    rows = in_pixels(predictions[0].T.astype(np.float32), fitted)
     scores = rows[:, 4 : rows.shape[1] - count]
     numbers = scores.argmax(axis=1)
     best = scores[np.arange(len(scores)), numbers]
@@ -91,10 +144,10 @@ def yolo_end_to_end(
 ) -> list[Found]:
     """Return the instances of a YOLO segmentation network that suppresses doubles itself, in an image of `shape`.
 
-    `predictions` (1, N, 6 + M): x0, y0, x1, y1 [input pixels], score, number of the class, M mask coefficients;
-    `prototypes` (1, M, h, w).
+    `predictions` (1, N, 6 + M): x0, y0, x1, y1 [input pixels or shares], score, number of the class, M mask
+    coefficients; `prototypes` (1, M, h, w).
     """
-    rows = predictions[0].astype(np.float32)
+    rows = in_pixels(predictions[0].astype(np.float32), fitted)
     sound = np.isfinite(rows).all(axis=1) & (rows[:, 4] >= score_threshold)
     rows = rows[sound][np.argsort(-rows[sound, 4], kind="stable")][:MOST_CANDIDATES]
     masks = _masks_of_coefficients(rows[:, END_TO_END:], prototypes, rows[:, :4], fitted, shape)

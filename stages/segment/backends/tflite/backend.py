@@ -1,0 +1,11 @@
+"""Backend `tflite`: the masks of a TensorFlow Lite network with classes of the vocabulary."""
+
+from __future__ import annotations
+
+from scenewright.stages.segment.choice import BackendRequest
+from scenewright.stages.segment.networks.pictures import PictureBackend, open_pictures
+
+
+def open_backend(request: BackendRequest) -> PictureBackend:
+    """Return the backend that the request asks for. Raises as `open_pictures` does."""
+    return open_pictures("tflite", request)
