@@ -59,7 +59,7 @@ def doubted(things: Sequence[int], told: Mapping[int, float], flush: np.ndarray)
     `told` [by thing]: mean score, 0..1 a look, of masks of things; `flush`: as in `flush_shares`.
     """
     usual = usual_score(things, told, flush)
-    reasons = {}
+    reasons: dict[int, str] = {}
     for k in things:
         if told[k] < WEAK * usual:
             reasons[k] = f"masks had it in few looks: {told[k]:.2f} where {usual:.2f} is usual"

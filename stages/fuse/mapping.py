@@ -36,7 +36,7 @@ class PanopticMapper:
         """Frame segments that each segment label was matched to, predicted or background."""
         self.seen_in: dict[int, int] = {}
         """Frames in which each instance was predicted, as the bits of an integer."""
-        self.free_space = FreeSpace()
+        self.free_space = FreeSpace() if parameters.merging == "ours" else None
         self.cameras: list[np.ndarray] = []
         """Where the camera was at every frame (3,) [m]."""
         self.frames_integrated = 0
@@ -107,7 +107,8 @@ class PanopticMapper:
             label_band=options.label_band * self.truncation_distance,
             stride=options.block_stride,
         )
-        self.free_space.add_frame(camera, depth, world_from_camera, options.maximum_depth)
+        if self.free_space is not None:
+            self.free_space.add_frame(camera, depth, world_from_camera, options.maximum_depth)
         self.cameras.append(np.array(world_from_camera[:3, 3], float))
         self.frames_integrated += 1
         if self.frames_integrated % options.regularize_every == 0:
@@ -187,8 +188,7 @@ class PanopticMapper:
         """Give every predicted instance its global label and remember the frame."""
         instances = self.merging.predict(predictions, unpredicted)
         for prediction in predictions:
-            instance = instances.get((prediction.frame_instance, prediction.class_id))
-            if instance is None:
-                continue
-            self.seen_in[instance] = self.seen_in.get(instance, 0) | (1 << self.labelled_frames)
+            instance = instances.get((prediction.frame_instance, prediction.class_id), 0)  # 0: it bounds the room
+            if instance:
+                self.seen_in[instance] = self.seen_in.get(instance, 0) | (1 << self.labelled_frames)
         self.labelled_frames += 1

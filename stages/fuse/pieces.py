@@ -180,7 +180,9 @@ def join_parts(
     cells = {name: _cells(cloud.vertices[members[name]], cloud.voxel) for name in names}
     trees = {name: cKDTree(cloud.vertices[members[name]]) for name in names}
     low = {name: cloud.vertices[members[name], 2].min() for name in names}
-    top = {name: _top_height(cloud.vertices[members[name]], cloud.normals[members[name]], cloud.voxel) for name in names}
+    top = {
+        name: _top_height(cloud.vertices[members[name]], cloud.normals[members[name]], cloud.voxel) for name in names
+    }
     for small in names.tolist():
         neighbours: list[tuple[float, int]] = []
         for large in names.tolist():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.stages.fuse.free_space import FreeSpace
-from scenewright.stages.fuse.layout.planes import LEVEL, Plane
+from scenewright.stages.fuse.layout.planes import Plane
 
 BEHIND = (0.16, 0.24, 0.32, 0.4, 0.5, 0.6)
 """Distances behind a plane at which free space is looked for [m]: nearer cells hold the surface itself."""
@@ -99,8 +99,3 @@ def _votes(bounding: np.ndarray, furniture: np.ndarray, weight: np.ndarray) -> f
 
 def _keys(cells: np.ndarray) -> np.ndarray:
     return np.asarray(cells[:, 0] * (1 << 31) + cells[:, 1])
-
-
-def is_level(normals: np.ndarray) -> np.ndarray:
-    """Return which surface (V,) with normals (V, 3) faces up."""
-    return np.asarray(normals[:, 2] > LEVEL)
