@@ -127,6 +127,18 @@ def _dropped(
     return reasons
 
 
+def _owners_of_labels(
+    entities: Sequence[ExtractedEntity], labelled: LabelledSurface, things: frozenset[int]
+) -> dict[int, int]:
+    """Return {segment label: the thing of masks that has most of its surface}."""
+    wanted = {e.instance for e in entities if e.class_id in things and e.segments}
+    pairs, counts = np.unique(np.stack([labelled.segment, labelled.instance]), axis=1, return_counts=True)
+    most: dict[int, tuple[int, int]] = {}
+    for label, owner, count in zip(*pairs.tolist(), counts.tolist(), strict=True):
+        most[label] = max(most.get(label, (0, 0)), (count, owner))
+    return {label: owner for label, (_, owner) in most.items() if owner in wanted}
+
+
 def _named(
     entities: Sequence[ExtractedEntity],
     labelled: LabelledSurface,
@@ -137,7 +149,7 @@ def _named(
 ) -> tuple[list[ExtractedEntity], LabelledSurface, dict[int, Reason]]:
     """Return entities and labels with names, and the reasons by instance."""
     unnamed = vocabulary.by_name(UNNAMED).id
-    thing_of = {label: e.instance for e in entities if e.class_id in things for label in e.segments}
+    thing_of = _owners_of_labels(entities, labelled, things)
     order = np.argsort(labelled.instance, kind="stable")
     ordered = labelled.instance[order]
     said: dict[int, Said] = {}

@@ -16,6 +16,8 @@ THIN = 0.35
 """What is thinner than this, and was seen from both sides, is one wall [m]."""
 LARGE = 1.0
 """Area of a plane that speaks neither for a bound of the room nor against [m^2]."""
+VOTES = 1.5
+"""Most that masks can say about a plane: log odds."""
 FAINT = 0.1
 """Weight of votes under which masks say nothing: a score a look."""
 
@@ -94,7 +96,7 @@ def evidence(plane: Plane, scene: Scene, floor: float, top: float) -> dict[str, 
 
 def _votes(bounding: np.ndarray, furniture: np.ndarray, weight: np.ndarray) -> float:
     share = weight / weight.sum()
-    return float(np.clip(1.5 * np.log((share @ bounding + FAINT) / (share @ furniture + FAINT)), -2.5, 2.5))
+    return float(np.clip(1.5 * np.log((share @ bounding + FAINT) / (share @ furniture + FAINT)), -VOTES, VOTES))
 
 
 def _keys(cells: np.ndarray) -> np.ndarray:

@@ -8,8 +8,8 @@ from scenewright.stages.fuse.layout.evidence import BEHIND, Scene
 from scenewright.stages.fuse.layout.planes import CELL, Plane
 from scipy import ndimage
 
-NARROWEST = 3
-"""Fewest cells of an opening in width and height."""
+NARROWEST, LOWEST = 4, 6
+"""Fewest cells of an opening in width and in height."""
 FILLED = 0.6
 """Least share of an opening's rectangle that was looked through."""
 
@@ -34,7 +34,7 @@ def openings_of(plane: Plane, scene: Scene, floor: float) -> tuple[Opening, ...]
     openings = []
     for number, (columns, rows) in enumerate(ndimage.find_objects(labels), 1):
         width, height = columns.stop - columns.start, rows.stop - rows.start
-        if min(width, height) < NARROWEST or (labels[columns, rows] == number).mean() < FILLED:
+        if width < NARROWEST or height < LOWEST or (labels[columns, rows] == number).mean() < FILLED:
             continue
         openings.append(
             Opening(
