@@ -15,6 +15,7 @@ from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from scenewright.stages.fuse.layout.evidence import Scene
 from scenewright.stages.fuse.layout.room import CEILING, FLOOR, WALL, Layout, find_layout
 from scenewright.stages.fuse.names import Naming, Said, name_of, rates_of, said_of
+from scenewright.stages.fuse.parts import absorb_pieces
 from scenewright.stages.fuse.pieces import Cloud, grown_things, pieces_beside
 from scenewright.stages.fuse.relabelling import relabelled
 from scenewright.stages.fuse.surface import Surface
@@ -23,6 +24,8 @@ from scenewright.stages.kit.class_extents import extent_of
 
 SURE = 0.5
 """Share of looks with a mask of a thing from which on no wall takes its surface: a screen that hangs flat on it."""
+FRAGMENT = 0.2
+"""A piece under this share of a thing of its name that it touches is a part of it."""
 BY_MASKS = "masks"
 GROWN = "masks, and the piece of which they have a part"
 PIECE = "a piece that geometry cuts"
@@ -84,22 +87,24 @@ def agreed(
         instance = np.where(bounded & layout.of(kind), number, instance)
     new_classes = {number: vocabulary.by_name(kind).id for number, kind in bounds.items()}
 
-    shapes = dict.fromkeys(bounds, BOUND)
+    shapes, standing = dict.fromkeys(bounds, BOUND), frozenset[int]()
     if minimum_area > 0:
         stuff = (instance > 0) & ~(is_thing & ~bounded)
         things_of = np.where(stuff, 0, instance)
         cloud = Cloud(scene.vertices - [0.0, 0.0, layout.floor or 0.0], scene.normals, voxel)
         grown = grown_things(cloud, things_of, stuff, minimum_area)
         of_thing = np.where(grown != things_of, 1.0, own_told)
-        piece, thing_of = pieces_beside(cloud, grown, stuff, of_thing, minimum_area)
+        found = pieces_beside(cloud, grown, stuff, of_thing, minimum_area)
         shapes |= dict.fromkeys(np.unique(grown[grown != things_of]).tolist(), GROWN)
         start = first + len(bounds) - 1
-        instance = np.where(stuff, instance, np.where(piece > 0, start + piece, thing_of))
-        pieces = range(start + 1, start + 1 + int(piece.max(initial=0)))
+        instance = np.where(stuff, instance, np.where(found.piece > 0, start + found.piece, found.thing_of))
+        pieces = range(start + 1, start + 1 + int(found.piece.max(initial=0)))
+        standing = frozenset(start + number for number in found.standing)
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
     named, labels, reasons = _named(kept, labels, shapes, votes, vocabulary, things)
+    named, labels, reasons = _without_fragments(surface, named, labels, reasons, standing, things - {unnamed}, unnamed)
     return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
 
 
@@ -125,6 +130,35 @@ def _dropped(
             share = own_mean[entity.instance]
             reasons[entity.instance] = f"a window, door or curtain that masks had in few looks: {share:.2f}"
     return reasons
+
+
+def _without_fragments(
+    surface: Surface,
+    entities: Sequence[ExtractedEntity],
+    labelled: LabelledSurface,
+    reasons: Mapping[int, Reason],
+    standing: frozenset[int],
+    named: frozenset[int],
+    unnamed: int,
+) -> tuple[list[ExtractedEntity], LabelledSurface, dict[int, Reason]]:
+    """Return entities where pieces of the name of a much larger thing that they touch are a part of it, or, where they
+    stand on it, have no name: its masks took them along."""
+    class_of = {e.instance: e.class_id for e in entities if e.class_id in named}
+    whole = absorb_pieces(labelled.instance, surface.faces, class_of, share=FRAGMENT)
+    taken = set(np.unique(labelled.instance[whole != labelled.instance]).tolist())
+    result, class_id, last = [], labelled.class_id.copy(), dict(reasons)
+    for entity in entities:
+        if entity.instance in taken & standing:
+            naming = last[entity.instance].naming
+            assert naming is not None  # it is a thing
+            naming = replace(naming, class_id=unnamed, rule="it stands on a thing of the name that masks gave it")
+            last[entity.instance] = replace(last[entity.instance], naming=naming)
+            class_id[labelled.instance == entity.instance] = unnamed
+            entity = replace(entity, class_id=unnamed)
+        result.append(entity)
+    instance = np.where(np.isin(labelled.instance, sorted(taken & standing)), labelled.instance, whole)
+    kept, labels = relabelled(surface, result, replace(labelled, class_id=class_id), instance.astype(np.int32), {})
+    return kept, labels, last
 
 
 def _owners_of_labels(

@@ -70,6 +70,18 @@ class _Top:
     footprint: Footprint
 
 
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces of a surface (V,)."""
+
+    piece: np.ndarray
+    """(V,) int32: from 1 in the order of size, 0 of no piece."""
+    thing_of: np.ndarray
+    """(V,) int32: the thing of masks that each other vertex is of, 0 none."""
+    standing: frozenset[int]
+    """Pieces that stand on a level top."""
+
+
 class Footprint:
     """Where a level top lies, seen from above: its points (N, 2) and what they surround."""
 
@@ -215,22 +227,26 @@ def pieces_of(cloud: Cloud, free: np.ndarray, minimum_area: float) -> np.ndarray
     parts, standing, cut_from = cut_parts(cloud, parts)
     standing |= _on_tops(cloud, parts, 0)
     joined = join_parts(cloud, parts, standing, cut_from, minimum_area)
-    return numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area)
+    return numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area)[0]
 
 
-def numbered_pieces(cloud: Cloud, parts: np.ndarray, standing: Collection[int], minimum_area: float) -> np.ndarray:
-    """Return the parts (V,) that are large enough to be pieces, as in `pieces_of`."""
+def numbered_pieces(
+    cloud: Cloud, parts: np.ndarray, cut: Collection[int], minimum_area: float
+) -> tuple[np.ndarray, list[int]]:
+    """Return the parts (V,) that are large enough to be pieces, as in `pieces_of`, and the part of each; those that are
+    `cut` from others may be small."""
     pieces = []
     for part in np.unique(parts[parts >= 0]):
         own = np.flatnonzero(parts == part)
         extent, low = np.ptp(cloud.vertices[own], axis=0), cloud.vertices[own, 2].min()
         large = len(own) * cloud.voxel**2 >= minimum_area and extent[:2].max() >= SMALLEST
-        if (large and extent[2] >= LEAST_HEIGHT and low < HIGHEST) or (len(own) >= FEWEST and part in standing):
+        if (large and extent[2] >= LEAST_HEIGHT and low < HIGHEST) or (len(own) >= FEWEST and part in cut):
             pieces.append(own)
     piece = np.zeros(len(cloud.vertices), np.int32)
-    for number, own in enumerate(sorted(pieces, key=lambda own: (-len(own), own[0])), 1):
+    ordered = sorted(pieces, key=lambda own: (-len(own), own[0]))
+    for number, own in enumerate(ordered, 1):
         piece[own] = number
-    return piece
+    return piece, [int(parts[own[0]]) for own in ordered]
 
 
 def _tops(cloud: Cloud, parts: np.ndarray) -> list[_Top]:
@@ -299,8 +315,8 @@ WITHIN, BESIDE = 0.6, 0.1
 
 def pieces_beside(
     cloud: Cloud, instance: np.ndarray, room: np.ndarray, told: np.ndarray, minimum_area: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the piece (V,) int32 of every vertex, as `pieces_of` does, and the thing (V,) that it is of.
+) -> Pieces:
+    """Return the pieces beside things that masks found, as `pieces_of` does.
 
     instance (V,): things that masks found, 0 none; `room` (V,): what bounds the room; `told` (V,) 0..1: the share of
     looks that had the vertex in its thing. What stands on a thing's top is a piece unless most looks say that it is of
@@ -328,7 +344,8 @@ def pieces_beside(
             thing_of[own], cut[own] = host, -1
     cut = np.where(cut < first, -1, cut)
     joined = join_parts(cloud, cut, standing, cut_from, minimum_area)
-    return numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area), thing_of
+    piece, part_of = numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area)
+    return Pieces(piece, thing_of, frozenset(k for k, part in enumerate(part_of, 1) if part in standing))
 
 
 def _on_tops(cloud: Cloud, parts: np.ndarray, first: int) -> set[int]:
