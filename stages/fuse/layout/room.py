@@ -123,7 +123,8 @@ def _owners(planes: Sequence[Judged], scene: Scene) -> np.ndarray:
         if each.plane.is_level:
             facing = scene.normals @ each.plane.normal
             of_plane = (distance < BEFORE) | ((distance < FLAT) & (facing > 0.8))
-            of_plane &= (distance > -WITHIN) if each.kind == FLOOR and _is_upper(each, planes) else True
+            if _parts_storeys(each, planes):
+                of_plane &= (distance > -WITHIN) & (facing > -0.5)
         else:
             of_plane = (distance < BEFORE) & (distance > -WITHIN)
             of_plane &= np.isin(each.plane.cells(scene.vertices)[:, 0], _columns(each.plane, scene))
@@ -131,10 +132,10 @@ def _owners(planes: Sequence[Judged], scene: Scene) -> np.ndarray:
     return owner
 
 
-def _is_upper(each: Judged, planes: Sequence[Judged]) -> bool:
-    """Whether another floor lies lower."""
+def _parts_storeys(each: Judged, planes: Sequence[Judged]) -> bool:
+    """Whether another floor lies lower, or another ceiling higher: what is behind it is of another storey."""
     return any(
-        other.kind == FLOOR and other.log_odds > 0 and other.plane.offset < each.plane.offset - WITHIN
+        other.kind == each.kind and other.log_odds > 0 and other.plane.offset < each.plane.offset - WITHIN
         for other in planes
     )
 
