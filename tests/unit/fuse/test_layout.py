@@ -84,6 +84,14 @@ def test_a_partition_that_was_seen_from_both_sides_is_a_wall() -> None:
     assert (layout.of(WALL) | layout.of(CEILING) | layout.of(FLOOR))[of_partition].mean() > 0.99, "its end too"
 
 
+def test_what_stands_at_a_partition_is_not_of_the_wall_on_its_other_side() -> None:
+    shelf = Block("shelf", (2.5, 0.5, 0.0), (2.64, 2.0, 1.0))
+    scene, owner = seen((*ROOM, PARTITION, shelf), look_around(*ROOMS["partition"][1]))
+    layout = find_layout(replace(scene, furniture=(owner == len(ROOM) + 1).astype(float)))
+    front = (owner == len(ROOM) + 1) & (scene.vertices[:, 0] > 2.62) & (scene.vertices[:, 2] > 0.1)
+    assert front.sum() > 100 and not layout.owner[front].any()
+
+
 @pytest.mark.parametrize("name", ["kitchen", "bedroom"])
 @pytest.mark.parametrize("said", ["nothing", "wall everywhere", "tables everywhere"])
 def test_furniture_bounds_nothing_whatever_masks_say_of_everything(name: str, said: str) -> None:
