@@ -328,15 +328,19 @@ def pieces_beside(
     parts[free] = first + connected(cloud.vertices[free], cloud.voxel)
     last = int(parts.max(initial=0))
     cut, standing, cut_from = cut_parts(cloud, parts)
+    apart: set[int] = set()
     for part in np.unique(cut[(cut > last) & (instance > 0)]):
         own = cut == part
         if told[own].mean() >= TOLD:
             cut[own] = parts[own]
             standing.discard(int(part))
             cut_from.pop(int(part), None)
+        elif (whole := _touching(cloud, own, instance == 0, cut)) >= 0:
+            cut[own] = whole
+            apart.add(whole)
     standing |= _on_tops(cloud, cut, first)
     thing_of = np.where(cut < first, np.maximum(cut, 0), 0).astype(np.int32)
-    loose = [p for p in np.unique(cut[cut >= first]).tolist() if p <= last and p not in standing]
+    loose = [p for p in np.unique(cut[cut >= first]).tolist() if p <= last and p not in standing | apart]
     for part in loose:
         own = np.flatnonzero(cut == part)
         host = _host(cloud, own, thing_of)
@@ -344,8 +348,19 @@ def pieces_beside(
             thing_of[own], cut[own] = host, -1
     cut = np.where(cut < first, -1, cut)
     joined = join_parts(cloud, cut, standing, cut_from, minimum_area)
-    piece, part_of = numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area)
+    piece, part_of = numbered_pieces(cloud, joined, standing | set(cut_from) | apart, minimum_area)
     return Pieces(piece, thing_of, frozenset(k for k, part in enumerate(part_of, 1) if part in standing))
+
+
+def _touching(cloud: Cloud, own: np.ndarray, free: np.ndarray, parts: np.ndarray) -> int:
+    """Return the free part that most of the rim of `own` (V,) touches, -1 for none: a mask took the foot of a thing."""
+    candidates = np.flatnonzero(free & (parts >= 0))
+    if not len(candidates):
+        return -1
+    tree, reach = cKDTree(cloud.vertices[candidates]), 2 * cloud.voxel
+    distance, nearest = tree.query(cloud.vertices[own], distance_upper_bound=reach)
+    touched = parts[candidates[nearest[np.isfinite(distance)]]]
+    return int(np.bincount(touched).argmax()) if len(touched) else -1
 
 
 def _on_tops(cloud: Cloud, parts: np.ndarray, first: int) -> set[int]:

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.stages.fuse.free_space import FreeSpace
-from scenewright.stages.fuse.layout.planes import Plane
+from scenewright.stages.fuse.layout.planes import CELL, Plane
+from scipy import ndimage
 
 BEHIND = (0.16, 0.24, 0.32, 0.4, 0.5, 0.6)
 """Distances behind a plane at which free space is looked for [m]: nearer cells hold the surface itself."""
-FAR_BEHIND = 2.5
-"""Surface this far behind a plane is of another room [m]."""
+FAR_BEHIND, BEHIND_DOOR = 2.5, 1.0
+"""Surface this far behind a plane is of another room [m]; of one with a doorway, through which it is seen."""
+NARROWEST = 3
+"""Fewest cells of a doorway in width and height."""
 THIN = 0.35
 """What is thinner than this, and was seen from both sides, is one wall [m]."""
 LARGE = 1.0
@@ -44,7 +47,7 @@ class Scene:
 def share_behind(plane: Plane, scene: Scene) -> tuple[float, float]:
     """Return the shares of a plane's cells behind which free space was seen, and surface.
 
-    Of what is thin and was seen from both sides only the inside is asked.
+    Of what is thin and was seen from both sides only the inside is asked. Beside a doorway free space says nothing.
     """
     cells = np.unique(plane.cells(scene.vertices[plane.members]), axis=0)
     distance = plane.distance(scene.vertices)
@@ -59,9 +62,34 @@ def share_behind(plane: Plane, scene: Scene) -> tuple[float, float]:
     if scene.free is not None:
         for depth in BEHIND:
             free |= scene.free.is_free(plane.at(cells, -depth)) & (depth < thickness)
-    beyond = np.flatnonzero((distance < -0.1) & (distance > -FAR_BEHIND))
+    away = distance_to_doorway(plane, cells, scene)
+    far = FAR_BEHIND if np.isinf(away).all() else BEHIND_DOOR
+    beyond = np.flatnonzero((distance < -0.1) & (distance > -far))
     hidden = np.isin(own, np.unique(_keys(plane.cells(scene.vertices[beyond])))) & ~np.isfinite(thickness)
-    return float(free.mean()), float(hidden.mean())
+    asked = away > BEHIND[-1]
+    return float(free[asked].mean()) if asked.any() else 0.0, float(hidden.mean())
+
+
+def distance_to_doorway(plane: Plane, cells: np.ndarray, scene: Scene) -> np.ndarray:
+    """Return how far cells (N, 2) of an upright plane are from the next hole [m], infinite without one.
+
+    A hole has surface of the plane over it and on both sides, and cameras looked far through it: a shelf has none.
+    """
+    nowhere = np.full(len(cells), np.inf)
+    if scene.free is None or plane.is_level:
+        return nowhere
+    low = cells.min(axis=0)
+    surface = np.zeros(cells.max(axis=0) - low + 1, bool)
+    surface[tuple((cells - low).T)] = True
+    sides = np.logical_or.accumulate(surface, axis=0) & np.logical_or.accumulate(surface[::-1], axis=0)[::-1]
+    over = np.logical_or.accumulate(surface[:, ::-1], axis=1)[:, ::-1]
+    enclosed = np.argwhere(~surface & sides & over)
+    hole = np.zeros_like(surface)
+    hole[tuple(enclosed[scene.free.is_free(plane.at(enclosed + low, -BEHIND[-1]))].T)] = True
+    hole = ndimage.binary_opening(hole, np.ones((NARROWEST, NARROWEST), bool))
+    if not hole.any():
+        return nowhere
+    return np.asarray(ndimage.distance_transform_edt(~hole)[tuple((cells - low).T)] * CELL)
 
 
 def evidence(plane: Plane, scene: Scene, floor: float, top: float) -> dict[str, float]:
@@ -75,7 +103,7 @@ def evidence(plane: Plane, scene: Scene, floor: float, top: float) -> dict[str, 
         "area": float(np.clip(np.log(weight.sum() / LARGE), -1.5, 1.5)),
         "free space behind": 2.0 - 25.0 * free if scene.free is not None else 0.0,
         "surface behind": 1.0 - 6.0 * hidden,
-        "masks": _votes(scene.bounding[plane.members], scene.furniture[plane.members], weight),
+        "masks": votes(plane, scene),
     }
     reasons["free space behind"] = max(reasons["free space behind"], -4.0)
     reasons["surface behind"] = max(reasons["surface behind"], -3.0)
@@ -94,9 +122,20 @@ def evidence(plane: Plane, scene: Scene, floor: float, top: float) -> dict[str, 
     return reasons
 
 
-def _votes(bounding: np.ndarray, furniture: np.ndarray, weight: np.ndarray) -> float:
-    share = weight / weight.sum()
-    return float(np.clip(1.5 * np.log((share @ bounding + FAINT) / (share @ furniture + FAINT)), -VOTES, VOTES))
+def votes(plane: Plane, scene: Scene) -> float:
+    """Return the log odds that masks give: by how much more they call the plane a bound than the whole surface.
+
+    Masks that call everything a wall say nothing of any plane.
+    """
+    own = _called_bound(scene, plane.members)
+    usual = _called_bound(scene, np.arange(len(scene.vertices)))
+    return float(np.clip(1.5 * (own - max(usual, 0.0)), -VOTES, VOTES))
+
+
+def _called_bound(scene: Scene, members: np.ndarray) -> float:
+    """Return the log odds of a bound by what masks said of vertices."""
+    share = scene.areas[members] / scene.areas[members].sum()
+    return float(np.log((share @ scene.bounding[members] + FAINT) / (share @ scene.furniture[members] + FAINT)))
 
 
 def _keys(cells: np.ndarray) -> np.ndarray:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from scenewright.schemas.panoptic_map import Opening
-from scenewright.stages.fuse.layout.evidence import BEHIND, Scene
+from scenewright.stages.fuse.layout.evidence import BEHIND, NARROWEST, Scene
 from scenewright.stages.fuse.layout.planes import CELL, Plane
 from scipy import ndimage
 
-NARROWEST, LOWEST = 4, 6
-"""Fewest cells of an opening in width and in height."""
+LOWEST = 6
+"""Fewest cells of an opening in height."""
 FILLED = 0.6
 """Least share of an opening's rectangle that was looked through."""
+THRESHOLD = 2
+"""Cells over the floor that rays over a threshold do not reach."""
 
 
 def openings_of(plane: Plane, scene: Scene, floor: float) -> tuple[Opening, ...]:
@@ -36,11 +38,14 @@ def openings_of(plane: Plane, scene: Scene, floor: float) -> tuple[Opening, ...]
         width, height = columns.stop - columns.start, rows.stop - rows.start
         if width < NARROWEST or height < LOWEST or (labels[columns, rows] == number).mean() < FILLED:
             continue
+        bottom = rows.start
+        if 0 < bottom <= THRESHOLD and surface[columns, :bottom].mean() < 0.5:
+            bottom = 0
         openings.append(
             Opening(
                 left=round((columns.start + low[0] - cells[:, 0].min()) * CELL, 3),
                 width=round(width * CELL, 3),
-                sill=round(rows.start * CELL, 3),
+                sill=round(bottom * CELL, 3),
                 head=round(rows.stop * CELL, 3),
             )
         )

@@ -120,23 +120,26 @@ def _owners(planes: Sequence[Judged], scene: Scene) -> np.ndarray:
         if each.log_odds <= 0:
             break
         distance = each.plane.distance(scene.vertices)
+        behind = _depth_of(each, planes, scene)
+        of_plane = (distance < BEFORE) & (distance > -behind)
         if each.plane.is_level:
-            facing = scene.normals @ each.plane.normal
-            of_plane = (distance < BEFORE) | ((distance < FLAT) & (facing > 0.8))
-            of_plane &= (distance > -WITHIN) if each.kind == FLOOR and _is_upper(each, planes) else True
+            of_plane |= (np.abs(distance) < FLAT) & (scene.normals @ each.plane.normal > 0.8)
         else:
-            of_plane = (distance < BEFORE) & (distance > -WITHIN)
             of_plane &= np.isin(each.plane.cells(scene.vertices)[:, 0], _columns(each.plane, scene))
         owner[of_plane & (owner == 0)] = number
     return owner
 
 
-def _is_upper(each: Judged, planes: Sequence[Judged]) -> bool:
-    """Whether another floor lies lower."""
-    return any(
-        other.kind == FLOOR and other.log_odds > 0 and other.plane.offset < each.plane.offset - WITHIN
-        for other in planes
-    )
+def _depth_of(each: Judged, planes: Sequence[Judged], scene: Scene) -> float:
+    """Return how far behind a bound surface is of it [m]: not through what it parts from another room or storey."""
+    others = [other for other in planes if other.log_odds > 0 and other is not each]
+    if each.plane.is_level and not any(
+        other.kind == each.kind and other.plane.offset < each.plane.offset - WITHIN for other in others
+    ):
+        return np.inf
+    backs = [other.plane for other in others if other.plane.normal @ each.plane.normal < -PARALLEL]
+    gaps = [-float(np.median(each.plane.distance(scene.vertices[back.members]))) for back in backs]
+    return min([WITHIN, *(gap - BEFORE for gap in gaps if gap > BEFORE)])
 
 
 def _columns(plane: Plane, scene: Scene) -> np.ndarray:
