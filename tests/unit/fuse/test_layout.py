@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenewright.schemas.panoptic_map import LayoutFile
-from scenewright.stages.fuse.layout.evidence import Scene, votes
+from scenewright.stages.fuse.layout.evidence import VOTES, Scene, votes
 from scenewright.stages.fuse.layout.file import layout_file
 from scenewright.stages.fuse.layout.planes import level_planes, upright_planes
 from scenewright.stages.fuse.layout.room import CEILING, FLOOR, WALL, Layout, find_layout
@@ -112,8 +112,8 @@ def test_votes_move_log_odds_one_way_and_the_other() -> None:
     counter = next(each.plane for each in layout.planes if each.log_odds < 0 and abs(each.plane.offset + 3.4) < 0.01)
     of_room, of_counter = (owner < len(ROOM)).astype(float), (owner == len(ROOM)).astype(float)
     assert votes(counter, scene) == 0.0
-    assert votes(counter, replace(scene, bounding=of_room, furniture=of_counter)) == -2.5
-    assert votes(counter, replace(scene, bounding=of_counter)) == 2.5
+    assert votes(counter, replace(scene, bounding=of_room, furniture=of_counter)) == -VOTES
+    assert votes(counter, replace(scene, bounding=of_counter)) == VOTES
     wall = next(each.plane for each in layout.planes if each.kind == WALL)
     assert votes(wall, replace(scene, bounding=of_room, furniture=of_counter)) > 0
 

@@ -46,7 +46,8 @@ def beside(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pieces beside the things of masks, and the thing of every vertex; floor and wall are the room's."""
     shares = np.broadcast_to(np.asarray(told, float), instance.shape)
-    return pieces_beside(cloud_of(scene), instance.astype(np.int32), scene[2] < 2, shares, area)
+    found = pieces_beside(cloud_of(scene), instance.astype(np.int32), scene[2] < 2, shares, area)
+    return found.piece, found.thing_of
 
 
 def of_part(piece: np.ndarray, owner: np.ndarray, part: int) -> int:
@@ -194,8 +195,8 @@ def test_small_and_empty() -> None:
     assert not piece.any() and (thing == everything).all(), "all is named"
     nothing = Cloud(np.zeros((0, 3)), np.zeros((0, 3)), VOXEL)
     assert pieces_of(nothing, np.zeros(0, bool), 0.1).shape == (0,)
-    piece, thing = pieces_beside(nothing, np.zeros(0, np.int32), np.zeros(0, bool), np.zeros(0), 0.1)
-    assert piece.shape == thing.shape == (0,)
+    found = pieces_beside(nothing, np.zeros(0, np.int32), np.zeros(0, bool), np.zeros(0), 0.1)
+    assert found.piece.shape == found.thing_of.shape == (0,) and not found.standing
 
 
 def test_a_footprint_surrounds_what_hides_it() -> None:
