@@ -13,7 +13,7 @@ class GeometricBackend:
     """Nobody names anything."""
 
     name = "geometric"
-    label = "geometry alone"
+    label = "geometry alone, class-agnostic"
     streams: tuple[str, ...] = ("depth",)
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
