@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from pydantic import Field
 from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
@@ -11,6 +11,23 @@ from scenewright.schemas.edits import AppliedEditsFile
 
 SNAPSHOTS = "snapshots"
 """Folder of the partial maps; each is named by the number of frames in it."""
+
+
+class Because(Model):
+    """Why an entity has its surface and its name."""
+
+    shape: str
+    """How its surface was found."""
+    looks: float
+    """How many frames looked at a spot of it, in the mean."""
+    said: dict[str, float]
+    """What masks said most: class -> mean score, 0..1 a look."""
+    name: str = ""
+    """Rule that gave the name; empty of what is no thing."""
+    posterior: float | None = None
+    """Of the name."""
+    runners_up: dict[str, float] = Field(default_factory=dict)
+    """Class -> posterior of the names that come next."""
 
 
 class Entity(Model):
@@ -32,6 +49,8 @@ class Entity(Model):
     """Frames that voted for it."""
     segments: tuple[int, ...]
     """Global segment labels l in it."""
+    because: Because | None = Field(default=None, exclude_if=lambda because: because is None)
+    """Absent of scans of others, and of rules other than ours."""
 
 
 class EntitiesFile(Model):
@@ -47,6 +66,50 @@ class EntitiesFile(Model):
     entities: tuple[Entity, ...]
 
 
+class Opening(Model):
+    """A hole in a wall through which cameras looked, at least 0.3 m wide."""
+
+    left: float
+    """Where it begins along the wall, seen from the room [m from the wall's `start`]."""
+    width: float
+    """[m]"""
+    sill: float
+    """Height over the floor [m]; 0: a door."""
+    head: float
+    """[m]"""
+
+
+class LayoutPlane(Model):
+    """A plane that was judged: whether it bounds the room."""
+
+    kind: Literal["floor", "wall", "ceiling"]
+    """What it is, or would be."""
+    bounds: bool
+    normal: Vector3
+    """Unit vector into the room, world frame."""
+    offset: float
+    """normal . p = offset for points p on it [m]."""
+    area: float
+    """Of its surface [m^2]."""
+    start: Vector3
+    end: Vector3
+    """Ends of what was seen of it, in the world frame [m]: of a wall its lower left and upper right corner."""
+    reasons: dict[str, float]
+    """Reason -> log odds."""
+    log_odds: float
+    """Over 0 it bounds the room."""
+    openings: tuple[Opening, ...] = ()
+    """Of a wall."""
+
+
+class LayoutFile(Model):
+    """layout.json: planes by their log odds, those that bound the room first."""
+
+    floor: float | None
+    """Height of the floor [m]; None where none was found."""
+    planes: tuple[LayoutPlane, ...]
+
+
 class PanopticMap(Artifact):
     """`mesh.ply` (whole map, colour), `mesh_labels.npz` (`instance`, `segment`, `class_id`: (V,) int32 per vertex
     of mesh.ply, 0 = unlabelled), `entities/<instance>.ply`, `entities.json`, `counts.npz` (the triple-wise
@@ -54,7 +117,8 @@ class PanopticMap(Artifact):
     blocks sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation
     distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). With `--snapshot-every`
     also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply. Of an
-    annotated scan (`--from-mesh`) there are no counts and no volume. Of an edited map (`edit map`) `edits.json` says
+    annotated scan (`--from-mesh`) there are no counts and no volume. `layout.json` says which planes bound the room and
+    why (`--merging ours` of frames). Of an edited map (`edit map`) `edits.json` says
     what became of each edit."""
 
     kind: ClassVar[str] = "panoptic_map"
@@ -69,3 +133,4 @@ class PanopticMap(Artifact):
 
     info = Document(EntitiesFile, "entities.json")
     edits = OptionalDocument(AppliedEditsFile, "edits.json")
+    layout = OptionalDocument(LayoutFile, "layout.json")

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from scenewright.stages.kit.exports import exported
 
 if TYPE_CHECKING:
-    from scenewright.stages.fuse.closing import MaskSource
     from scenewright.stages.fuse.integration import integrate
     from scenewright.stages.fuse.listings import Listings
     from scenewright.stages.fuse.mapping import PanopticMapper

@@ -8,22 +8,20 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.fuse.annotated_scan import AnnotatedScan
+from scenewright.stages.fuse.layout.evidence import Scene
+from scenewright.stages.fuse.layout.planes import LEVEL
+from scenewright.stages.fuse.layout.room import CEILING, FLOOR, WALL, find_layout
+from scenewright.stages.fuse.pieces import Cloud, pieces_of
 from scenewright.stages.fuse.point_surface import local_axes
-from scenewright.stages.fuse.unnamed_pieces import CEILING, FLOOR, LEVEL, SAME_LEVEL, unnamed_pieces
-from scenewright.stages.fuse.walls import of_walls
 from scenewright.stages.kit.geometry.cells import cell_keys
 from scenewright.stages.kit.geometry.point_clouds import vertex_normals
-
-FLOOR_SHARE, LEAST_FLOOR = 0.25, 0.5
-"""The floor is the lowest level that holds this share of the surface of the one that holds most, and this much at least
-[m^2]."""
 
 
 def told_apart(scan: AnnotatedScan, voxel: float, minimum_area: float, where: Path) -> AnnotatedScan:
     """Return the scan with an instance for each piece of surface that stands free, and floor, walls and ceiling.
 
     Where points are farther apart than `voxel` [m], cubes as large as their distance stand for it; `minimum_area` [m^2]
-    as in `unnamed_pieces`. Raises BadInput when there is no floor.
+    as in `pieces_of`. Raises BadInput when there is no floor.
     """
     points, edge = scan.vertices, voxel
     if not len(scan.faces):
@@ -33,25 +31,20 @@ def told_apart(scan: AnnotatedScan, voxel: float, minimum_area: float, where: Pa
     count = np.bincount(inverse)
     middles = np.stack([np.bincount(inverse, weights=points[:, k]) / count for k in range(3)], axis=1)
     normals = vertex_normals(points, scan.faces)[first] if len(scan.faces) else _into_the_room(middles)
-    floor_height = _floor_height(middles[np.abs(normals[:, 2]) > LEVEL, 2], LEAST_FLOOR / edge**2)
-    if floor_height is None:
+    nothing = np.zeros(len(middles))
+    areas = np.full(len(middles), edge**2)
+    layout = find_layout(Scene(middles, normals, areas, nothing, nothing, np.zeros((0, 3)), None))
+    if layout.floor is None:
         raise BadInput(
             f"{where}: nothing of it is labelled, and no floor is seen",
             hint="label it, or say which axis is up (--up AXIS) and in which unit it is (--unit UNIT)",
         )
-    middles = middles - [0.0, 0.0, floor_height]
-    height, level = middles[:, 2], np.abs(normals[:, 2]) > LEVEL
-    floor = height < FLOOR
-    ceiling = level & (height > CEILING)
-    walls = of_walls(middles, normals, ~floor & ~ceiling, edge)
-    layout = floor | ceiling | walls
-    piece, _ = unnamed_pieces(
-        middles, normals, np.zeros(len(middles), np.int32), layout, voxel=edge, minimum_area=minimum_area
-    )
+    cloud = Cloud(middles - [0.0, 0.0, layout.floor], normals, edge)
+    piece = pieces_of(cloud, layout.owner == 0, minimum_area)
     most = int(piece.max(initial=0))
     names = {number: "object" for number in range(1, most + 1)}
-    for number, (name, mask) in enumerate((("floor", floor), ("ceiling", ceiling), ("wall", walls)), most + 1):
-        piece[mask] = number
+    for number, name in enumerate((FLOOR, CEILING, WALL), most + 1):
+        piece[layout.of(name)] = number
         names[number] = name
     return replace(scan, labels=piece[inverse].astype(np.int64), names=names, are_instances=True)
 
@@ -68,18 +61,3 @@ def _into_the_room(points: np.ndarray) -> np.ndarray:
     across = np.einsum("nk,nk->n", normals[:, :2], np.median(points[:, :2], axis=0) - points[:, :2])
     flip = np.where(np.abs(normals[:, 2]) > 1 - LEVEL, normals[:, 2] < 0, across < 0)
     return np.where(flip[:, None], -normals, normals)
-
-
-def _floor_height(heights: np.ndarray, fewest: float) -> float | None:
-    """Return the height of the lowest level that many of the heights (N,) are at, `fewest` at least; None without."""
-    if len(heights) < fewest:
-        return None
-    places = np.floor(heights / SAME_LEVEL).astype(int)
-    lowest = int(places.min())
-    counts = np.bincount(places - lowest)
-    counts = counts + np.append(counts[1:], 0)
-    large = np.flatnonzero(counts >= max(fewest, FLOOR_SHARE * counts.max()))
-    if not len(large):
-        return None
-    first = int(large[0])
-    return float(np.median(heights[(places - lowest == first) | (places - lowest == first + 1)]))

@@ -2,36 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scenewright.schemas.base import as_vector
-from scenewright.schemas.panoptic_map import EntitiesFile, Entity
+from scenewright.schemas.panoptic_map import Because, EntitiesFile, Entity, LayoutFile
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
-from scenewright.stages.fuse.agreed_names import with_agreed_names, without_claimed
+from scenewright.stages.fuse.agreement import Agreement, Reason, agreed
 from scenewright.stages.fuse.counts import TripleCounts
 from scenewright.stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
-from scenewright.stages.fuse.impossible_names import without_impossible_names
+from scenewright.stages.fuse.layout.evidence import Scene
+from scenewright.stages.fuse.layout.file import layout_file
 from scenewright.stages.fuse.mapping import PanopticMapper
-from scenewright.stages.fuse.parameters import FuseParameters
-from scenewright.stages.fuse.piece_entities import Classes, by_geometry, with_unnamed_pieces
+from scenewright.stages.fuse.ours import Ours
 from scenewright.stages.fuse.smoothing import smoothed_tsdf
-from scenewright.stages.fuse.strange_places import share_told, sure_things, thing_score, without_names
 from scenewright.stages.fuse.surface import Surface, extract_surface
+from scenewright.stages.fuse.votes import Votes
 from scenewright.stages.kit.formats.map_files import mesh_name
+from scenewright.stages.kit.geometry.point_clouds import vertex_areas, vertex_normals
 from scenewright.stages.kit.stage import Progress
 
-FLAT_TOPPED = ("table", "desk")
-"""Classes of things that are a level top on legs."""
-
-
-@dataclass(frozen=True)
-class MaskSource:
-    """Whose masks a map is made of."""
-
-    label: str
-    recognised: float | None = None
-    """As in segments.json."""
+MOST_SAID = 3
+"""Classes of which `because` tells what was said."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +37,13 @@ class ClosedMap:
     counts: TripleCounts
     merged: np.ndarray
     """Merged segment label of every segment label."""
+    layout: LayoutFile | None = None
+    """None of maps of other rules than ours."""
+    dropped: tuple[str, ...] = field(default=())
+    """Why things of masks are no entities."""
 
 
-def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
+def describe(entity: ExtractedEntity, vocabulary: Vocabulary, reason: Reason | None = None) -> Entity:
     """Return an entity's row of entities.json."""
     return Entity(
         instance=entity.instance,
@@ -60,18 +56,42 @@ def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
         confidence=round(entity.confidence, 6),
         observations=entity.observations,
         segments=entity.segments,
+        because=None if reason is None else told(reason, vocabulary),
     )
 
 
-def is_strange(source: MaskSource, parameters: FuseParameters) -> bool:
-    """Whether the segmenter recognised so little of this place that its masks are not to be believed."""
-    return source.recognised is not None and source.recognised < parameters.least_recognised
+def told(reason: Reason, vocabulary: Vocabulary) -> Because:
+    """Return a reason as entities.json has it."""
+    said = sorted(reason.said.scores.items(), key=lambda row: (-row[1], row[0]))[:MOST_SAID]
+    naming = reason.naming
+    return Because(
+        shape=reason.shape,
+        looks=round(reason.said.looks, 1),
+        said={vocabulary.by_id(c).name: round(score, 3) for c, score in said},
+        name="" if naming is None else naming.rule,
+        posterior=None if naming is None else round(naming.posterior, 3),
+        runners_up={vocabulary.by_id(c).name: p for c, p in (() if naming is None else naming.runners_up)},
+    )
 
 
-def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, progress: Progress) -> ClosedMap:
-    """Merge what is one instance, draw the surface and cut it into entities.
+def scene_of(surface: Surface, segment: np.ndarray, votes: Votes, mapper: PanopticMapper, merging: Ours) -> Scene:
+    """Return what layout is found in. segment (V,): merged label of every vertex."""
+    vertices = surface.vertices.astype(float)
+    return Scene(
+        vertices=vertices,
+        normals=vertex_normals(vertices, surface.faces),
+        areas=vertex_areas(vertices, surface.faces),
+        bounding=votes.share(segment, merging.bounds),
+        furniture=votes.share(segment, merging.things),
+        cameras=np.array(mapper.cameras, float).reshape(-1, 3),
+        free=mapper.free_space,
+    )
 
-    Labels of the mapper are merged by it.
+
+def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progress: Progress) -> ClosedMap:
+    """Merge what is one instance, draw the surface and cut it into entities. Labels of the mapper are merged by it.
+
+    `label`: whose masks these are.
     """
     parameters = mapper.parameters
     with progress.step("merge instances"):
@@ -94,46 +114,34 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource
             piece_share=parameters.piece_share,
             unnamed=unnamed,
         )
+        segment = merged[surface.segment]
         entities, labelled = extract_entities(
-            surface, merged[surface.segment], grouping, mapper.sightings, mapper.merging.things, settings
+            surface, segment, grouping, mapper.sightings, mapper.merging.things, settings
         )
-        ours = parameters.merging == "ours"
-        strange = ours and is_strange(source, parameters)
-        things, scores = mapper.merging.things, grouping.class_scores
-        flat_topped = frozenset(vocabulary.by_name(name).id for name in FLAT_TOPPED)
-        if strange:
-            score_of = {e.instance: thing_score(e.segments, scores, things, mapper.sightings) for e in entities}
-            sure = sure_things(entities, score_of, things - flat_topped)
-            entities, labelled = without_names(entities, labelled, score_of, things, unnamed)
-        elif ours:
-            entities, labelled = without_impossible_names(
-                entities, labelled, scores, mapper.sightings, vocabulary, unnamed
+    agreement: Agreement | None = None
+    if isinstance(mapper.merging, Ours):
+        with progress.step("lay out the room"):
+            votes = Votes(mapper.merging.class_scores.by_segment, mapper.sightings)
+            scene = scene_of(surface, segment, votes, mapper, mapper.merging)
+            agreement = agreed(
+                surface,
+                entities,
+                labelled,
+                scene,
+                votes,
+                vocabulary,
+                voxel=parameters.voxel_size,
+                minimum_area=parameters.unnamed_area,
             )
-        if parameters.unnamed_area > 0 and ours:
-            classes = Classes(
-                floor=vocabulary.by_name("floor").id,
-                wall=vocabulary.by_name("wall").id,
-                ceiling=vocabulary.by_name("ceiling").id,
-                unnamed=unnamed,
-                things=things,
-                tables=flat_topped,
-            )
-            size = {"voxel": parameters.voxel_size, "minimum_area": parameters.unnamed_area}
-            if strange:
-                entities, labelled = by_geometry(surface, entities, labelled, classes, **size, sure=sure)
-            else:
-                name_scores = share_told(labelled, scores, mapper.sightings)
-                scores = without_claimed(scores, entities)
-                entities, labelled = with_unnamed_pieces(surface, entities, labelled, classes, **size, told=name_scores)
-            least = parameters.minimum_prediction_share
-            entities, labelled = with_agreed_names(
-                entities, labelled, scores, mapper.sightings, vocabulary, unnamed, least
-            )
+            entities, labelled = agreement.entities, agreement.labelled
+    reasons = {} if agreement is None else agreement.reasons
     file = EntitiesFile(
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,
         frames_integrated=mapper.frames_integrated,
-        segmentation=source.label,
-        entities=tuple(describe(entity, vocabulary) for entity in entities),
+        segmentation=label,
+        entities=tuple(describe(entity, vocabulary, reasons.get(entity.instance)) for entity in entities),
     )
-    return ClosedMap(file, entities, surface, labelled, grouping.counts, merged)
+    layout = None if agreement is None else layout_file(agreement.layout, scene)
+    dropped = () if agreement is None else agreement.dropped
+    return ClosedMap(file, entities, surface, labelled, grouping.counts, merged, layout, dropped)

@@ -16,6 +16,7 @@ from scenewright.stages.fuse.association import (
     measure_overlap,
     overlapping_labels,
 )
+from scenewright.stages.fuse.free_space import FreeSpace
 from scenewright.stages.fuse.integration import integrate
 from scenewright.stages.fuse.merging import Merging, SharedSegment
 from scenewright.stages.fuse.parameters import FuseParameters
@@ -35,6 +36,9 @@ class PanopticMapper:
         """Frame segments that each segment label was matched to, predicted or background."""
         self.seen_in: dict[int, int] = {}
         """Frames in which each instance was predicted, as the bits of an integer."""
+        self.free_space = FreeSpace() if parameters.merging == "ours" else None
+        self.cameras: list[np.ndarray] = []
+        """Where the camera was at every frame (3,) [m]."""
         self.frames_integrated = 0
         self.labelled_frames = 0
         self.segment_merges = 0
@@ -103,6 +107,9 @@ class PanopticMapper:
             label_band=options.label_band * self.truncation_distance,
             stride=options.block_stride,
         )
+        if self.free_space is not None:
+            self.free_space.add_frame(camera, depth, world_from_camera, options.maximum_depth)
+        self.cameras.append(np.array(world_from_camera[:3, 3], float))
         self.frames_integrated += 1
         if self.frames_integrated % options.regularize_every == 0:
             self.regularize()
@@ -181,6 +188,7 @@ class PanopticMapper:
         """Give every predicted instance its global label and remember the frame."""
         instances = self.merging.predict(predictions, unpredicted)
         for prediction in predictions:
-            instance = instances[prediction.frame_instance, prediction.class_id]
-            self.seen_in[instance] = self.seen_in.get(instance, 0) | (1 << self.labelled_frames)
+            instance = instances.get((prediction.frame_instance, prediction.class_id), 0)  # 0: it bounds the room
+            if instance:
+                self.seen_in[instance] = self.seen_in.get(instance, 0) | (1 << self.labelled_frames)
         self.labelled_frames += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import deepcopy
 from itertools import combinations
 
 from scenewright.stages.fuse.association import Prediction, associate_instances
@@ -29,8 +30,11 @@ class Ours:
     """A `Merging`. Segments merge when they are of one class and more often together than apart; instances also when
     frames saw them as one; every stuff class is one instance; things are grouped when the map is closed."""
 
-    def __init__(self, parameters: FuseParameters, things: frozenset[int]) -> None:
+    def __init__(
+        self, parameters: FuseParameters, things: frozenset[int], bounds: frozenset[int] = frozenset()
+    ) -> None:
         self.things = things
+        self.bounds = bounds
         self.counts = TripleCounts()
         self.class_scores = ClassScores()
         self.shared = PairEvidence()
@@ -43,7 +47,10 @@ class Ours:
 
     def observe_segments(self, segments: Sequence[SharedSegment], matched: Sequence[int]) -> None:
         """Labels of the segment's class speak for their merging; different segments speak against it."""
-        groups = [pairs_of_one_class(segment.labels, segment.class_id, self.counts) for segment in segments]
+        groups = [
+            pairs_of_one_class(segment.labels, 0 if segment.class_id in self.bounds else segment.class_id, self.counts)
+            for segment in segments
+        ]
         self.shared.observe(groups, matched)
 
     def merge_segments(self, labels: MergedLabels) -> list[tuple[int, int]]:
@@ -57,11 +64,13 @@ class Ours:
 
     def predict(self, predictions: Sequence[Prediction], unpredicted: Sequence[int]) -> dict[FrameInstance, int]:
         """Associate by the triple-wise count; remember what the frame saw as one, and how sure its masks were."""
+        for p in predictions:
+            self.class_scores.add(p.segment, p.class_id, p.score)
+        predictions = [p for p in predictions if p.class_id not in self.bounds]
         self._observe_instances(predictions)
         instances, self._next_instance = associate_instances(predictions, self.counts, self._next_instance)
         for p in predictions:
             self.counts.add(p.segment, p.class_id, instances[p.frame_instance, p.class_id])
-            self.class_scores.add(p.segment, p.class_id, p.score)
         return instances
 
     def merge_instances(self) -> list[tuple[int, int]]:
@@ -99,7 +108,7 @@ class Ours:
     def grouping(self, seen_in: Mapping[int, int], minimum_votes: int, unnamed: int) -> Grouping:
         """Partition the segments of things by all that frames said of each pair."""
         return group_things(
-            self.counts,
+            self._counts_of_things(),
             self.segment_evidence,
             self.things,
             seen_in,
@@ -107,6 +116,16 @@ class Ours:
             scores=self.class_scores.by_segment,
             unnamed=unnamed,
         )
+
+    def _counts_of_things(self) -> TripleCounts:
+        """Return the counts without the segments that most masks called a bound of the room."""
+        counts = deepcopy(self.counts)
+        for label in sorted(self.counts.by_segment):
+            row = self.class_scores.by_segment.get(label, {})
+            bounding = sum(score for c, score in row.items() if c in self.bounds)
+            if 2 * bounding > sum(row.values()):
+                counts.forget(label)
+        return counts
 
     def _observe_instances(self, predictions: Sequence[Prediction]) -> None:
         """Count which segments and which instances of things the frame sees as one, and which as two: a frame instance

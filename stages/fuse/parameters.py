@@ -101,18 +101,10 @@ class FuseParameters(Parameters):
     piece_share: float = Field(
         0.2, ge=0, lt=1, description="Things under this share of one of their class that they touch are a part of it"
     )
-    least_recognised: float = Field(
-        0.84,
-        ge=0,
-        le=1,
-        description="`ours`: where our own network recognised less than this share of what it took for things, walls "
-        "are what geometry says, its masks are proposals, and what it calls a piece counts where most looks agree "
-        "(0: its masks are always believed)",
-    )
     unnamed_area: float = Field(
         0.2,
         ge=0,
-        description="`ours`: surface that no mask named, stands free of walls and has this area is an `object` in one "
+        description="`ours`: surface that no mask names, stands free of walls and has this area is an `object` in one "
         "piece [m^2] (0: it stays surroundings)",
     )
     unit: Literal["declared", UnitName] = Field(

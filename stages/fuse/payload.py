@@ -28,6 +28,8 @@ def write_meshes(root: Path, closed: ClosedMap) -> None:
     """Write what a contact graph is built from: entities.json, a mesh per entity and the whole mesh."""
     (root / "entities").mkdir(parents=True, exist_ok=True)
     closed.file.write(root / "entities.json")
+    if closed.layout is not None:
+        closed.layout.write(root / "layout.json")
     write_ply(root / "mesh.ply", ColoredMesh(closed.surface.vertices, closed.surface.faces, closed.surface.colors))
     for entity in closed.entities:
         write_ply(root / mesh_name(entity.instance), entity.mesh)

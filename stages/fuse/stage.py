@@ -14,9 +14,10 @@ from scenewright.schemas.segments import Segments
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
-from scenewright.stages.fuse.closing import MaskSource, close_map, is_strange
+from scenewright.stages.fuse.closing import close_map
 from scenewright.stages.fuse.from_mesh import run_from_mesh
 from scenewright.stages.fuse.inputs import check_origin, check_segments
+from scenewright.stages.fuse.layout.room import CEILING, FLOOR, WALL
 from scenewright.stages.fuse.listings import Listings
 from scenewright.stages.fuse.mapping import PanopticMapper
 from scenewright.stages.fuse.merging import Merging
@@ -33,11 +34,7 @@ from scenewright.stages.kit.prefetching import prefetched
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
 
-MERGING: dict[str, Callable[[FuseParameters, frozenset[int]], Merging]] = {
-    "ours": Ours,
-    "thesis": Thesis,
-    "separate": Separate,
-}
+RIVALS: dict[str, Callable[[FuseParameters, frozenset[int]], Merging]] = {"thesis": Thesis, "separate": Separate}
 
 
 def run(
@@ -64,24 +61,31 @@ def run(
     check_origin(sequence, segments)
     vocabulary = load_vocabulary()
     with context.progress.step("integrate frames"):
-        mapper, skipped, source = _integrate_frames(
+        mapper, skipped, label = _integrate_frames(
             sequence, segments, trajectory, articulations, vocabulary, parameters, context
         )
-    return write_map(mapper, vocabulary, source, skipped, context)
+    return write_map(mapper, vocabulary, label, skipped, context)
+
+
+def bounds_of(vocabulary: Vocabulary) -> frozenset[int]:
+    """Return the classes of what bounds a room: geometry finds it, masks of these classes are votes."""
+    return frozenset(vocabulary.by_name(name).id for name in (FLOOR, WALL, CEILING))
 
 
 def new_mapper(parameters: FuseParameters, vocabulary: Vocabulary) -> PanopticMapper:
     """Return an empty map of the method that the parameters ask for."""
     things = frozenset(entry.id for entry in vocabulary.classes if entry.kind == "thing")
-    return PanopticMapper(parameters, MERGING[parameters.merging](parameters, things))
+    if parameters.merging == "ours":
+        return PanopticMapper(parameters, Ours(parameters, things, bounds_of(vocabulary)))
+    return PanopticMapper(parameters, RIVALS[parameters.merging](parameters, things))
 
 
 def write_map(
-    mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, skipped: Mapping[str, int], context: Context
+    mapper: PanopticMapper, vocabulary: Vocabulary, label: str, skipped: Mapping[str, int], context: Context
 ) -> PanopticMap:
     """Write the map that was built: its entities, meshes, counts and voxels. `skipped`: how many frames were left out
     by reason."""
-    closed = close_map(mapper, vocabulary, source, context.progress)
+    closed = close_map(mapper, vocabulary, label, context.progress)
     with context.progress.step("write the map"):
         write_payload(context.output, closed, mapper.blocks)
     summary: dict[str, str | float] = {
@@ -95,16 +99,16 @@ def write_map(
         "vertices": len(closed.surface.vertices),
         "blocks": mapper.blocks.count,
     }
-    if source.recognised is not None:
-        summary["recognised_share"] = round(source.recognised, 3)
-        summary["masks_believed"] = not is_strange(source, mapper.parameters)
+    if closed.layout is not None:
+        summary["bounds"] = sum(plane.bounds for plane in closed.layout.planes)
+        summary["masks_dropped"] = len(closed.dropped)
     return PanopticMap(context.output, outcome="ok" if len(closed.surface.faces) else "empty", summary=summary)
 
 
-def write_snapshot(mapper: PanopticMapper, vocabulary: Vocabulary, source: MaskSource, context: Context) -> None:
+def write_snapshot(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, context: Context) -> None:
     """Write the map as it would be if this frame were the last. The map that is being built does not notice."""
     with context.progress.step("snapshots"):
-        closed = close_map(mapper.held(), vocabulary, source, SilentProgress())
+        closed = close_map(mapper.held(), vocabulary, label, SilentProgress())
         folder = context.output / SNAPSHOTS / f"{mapper.frames_integrated:06d}"
         write_meshes(folder, closed)
 
@@ -117,7 +121,7 @@ def _integrate_frames(
     vocabulary: Vocabulary,
     parameters: FuseParameters,
     context: Context,
-) -> tuple[PanopticMapper, Counter[str], MaskSource]:
+) -> tuple[PanopticMapper, Counter[str], str]:
     """Return the map of all frames, how many frames were skipped by reason, and whose masks these are."""
     skipped: Counter[str] = Counter()
     require_depth(sequence)
@@ -125,7 +129,7 @@ def _integrate_frames(
     with FrameReader(sequence.path("frames.mcap")) as reader, PanopticReader(segments.path("panoptic.zip")) as masks:
         info = segments.info
         check_segments(info, reader.camera, len(reader), vocabulary)
-        listed, source = Listings(info), MaskSource(info.label, info.recognised)
+        listed, label = Listings(info), info.label
         del info  # the parsed file goes before the map grows
         poses = None
         if trajectory is not None:
@@ -149,7 +153,7 @@ def _integrate_frames(
             # Of the last frame the finished map is the snapshot, so one is taken when another frame comes.
             if parameters.snapshot_every and mapper.frames_integrated >= last_snapshot + parameters.snapshot_every:
                 last_snapshot = mapper.frames_integrated
-                write_snapshot(mapper, vocabulary, source, context)
+                write_snapshot(mapper, vocabulary, label, context)
             if frame.depth is None:
                 skipped["no_depth"] += 1
             elif pose is None:
@@ -159,4 +163,4 @@ def _integrate_frames(
                 camera = cameras[frame.camera_name]
                 depth = frame.depth if outdated is None else outdated.without(frame.depth, camera, pose, frame.index)
                 mapper.add_frame(camera, depth, frame.color, pose, ids, listing or ())
-    return mapper, skipped, source
+    return mapper, skipped, label

@@ -70,7 +70,7 @@ def _insert(keys: np.ndarray, slots: np.ndarray, key: int, slot: int) -> None:
 
 
 @compiled
-def _fill_table(keys: np.ndarray, slots: np.ndarray, coordinates: np.ndarray, count: int) -> None:
+def fill_table(keys: np.ndarray, slots: np.ndarray, coordinates: np.ndarray, count: int) -> None:
     for slot in range(count):
         _insert(keys, slots, pack(coordinates[slot, 0], coordinates[slot, 1], coordinates[slot, 2]), slot)
 
@@ -240,4 +240,4 @@ class VoxelBlocks:
             larger[: self.count] = getattr(self, name)[: self.count]
             setattr(self, name, larger)
         self._make_table(capacity)
-        _fill_table(self.keys, self.slots, self.coordinates, self.count)
+        fill_table(self.keys, self.slots, self.coordinates, self.count)

@@ -195,14 +195,21 @@ def class_of_word(word: str) -> str:
 def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, where: str) -> LabelMap:
     """Return what the numbers of a network stand for, from the names that it gives them.
 
-    Without a `given` set, the one that knows most of the names is taken; of equals, the vocabulary goes first. Raises
+    Without a `given` set, the one that knows most of the names is taken, of equals the vocabulary; names that it lacks
+    are looked for in the others. Raises
     BadInput when not one name is known. Placeholders (`N/A`, empty) are passed over.
     """
     real = {number: name for number, name in names.items() if plain(name) not in ("", "n/a", "none", "background")}
     candidates = [given] if given else [load_label_set(name) for name in MATCHED]
     best = max(candidates, key=lambda labels: sum(labels.find(name) is not None for name in real.values()))
-    matched = {number: label for number, name in real.items() if (label := best.find(name)) is not None}
-    unknown = tuple(sorted({name for name in real.values() if best.find(name) is None}))
+    # Masks of several networks may lie in one folder.
+    sets = [best, *(labels for labels in candidates if labels is not best)]
+    found = {
+        number: next((label for each in sets if (label := each.find(name)) is not None), None)
+        for number, name in real.items()
+    }
+    matched = {number: label for number, label in found.items() if label is not None}
+    unknown = tuple(sorted({real[number] for number, label in found.items() if label is None}))
     if not matched:
         examples = ", ".join(list(real.values())[:5])
         raise BadInput(

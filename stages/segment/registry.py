@@ -70,6 +70,8 @@ class BackendDeclaration:
     processes of their own."""
     address: str = ""
     """How an http address reads that is given in place of the name; empty: it goes by its name."""
+    nameless: bool = False
+    """Whether it gives no masks, by design: geometric segments are all that is asked of it."""
 
     def load(self, module: str) -> Any:
         """Return a module of its folder, loaded now: `backend` has `open_backend`."""

@@ -93,7 +93,9 @@ def run(
     }
     if recognised is not None:
         summary["recognised_share"] = round(recognised, 3)
-    return Segments(context.output, outcome="ok" if named_count else "empty", summary=summary)
+    nameless = all(declared.nameless for declared in chosen_backends(request))
+    found = total if nameless else named_count
+    return Segments(context.output, outcome="ok" if found else "empty", summary=summary)
 
 
 def recognised_share(frames: Iterable[FrameSegments], unnamed: int) -> float | None:

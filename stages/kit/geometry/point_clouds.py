@@ -28,6 +28,13 @@ def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.where(length > 1e-12, normals / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
 
 
+def vertex_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the area (V,) [m^2] that each vertex (V, 3) stands for: a third of that of the faces (F, 3) around it."""
+    corners = vertices[faces]
+    twice = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.bincount(faces.ravel(), weights=np.repeat(twice / 6, 3), minlength=len(vertices))
+
+
 def sample_large_triangles(
     vertices: np.ndarray, faces: np.ndarray, spacing: float, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.segments import FrameSegments, Segments
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
+from scenewright.stages.fuse.agreement import BOUND, BY_MASKS, PIECE
 from scenewright.stages.fuse.inputs import check_origin
 from scenewright.stages.fuse.parameters import STAGE, FuseParameters
 from scenewright.stages.fuse.stage import run
@@ -86,11 +87,12 @@ def test_files_agree(panoptic_map: PanopticMap) -> None:
         assert (len(part.vertices), len(part.faces)) == (entity.vertices, entity.triangles)
         assert np.allclose(part.vertices.min(axis=0), entity.box_minimum, atol=1e-6)
         assert set(class_ids[instance == label]) == {class_id(entity.class_name)}
-        assert set(np.unique(segment[instance == label])) & set(entity.segments)
+        assert bool(entity.segments) == (entity.class_name != "floor"), "geometry finds what bounds the room"
+        assert not entity.segments or set(np.unique(segment[instance == label])) & set(entity.segments)
     faces = mesh.faces[(instance[mesh.faces] == instance[mesh.faces][:, :1]).all(axis=1)]
     assert sum(e.triangles for e in entities.values()) >= len(faces[instance[faces[:, 0]] > 0])
     with np.load(panoptic_map.path("counts.npz"), allow_pickle=False) as counts:
-        assert (counts["count"] > 0).all() and len(set(counts["instance"].tolist())) == 4
+        assert (counts["count"] > 0).all() and len(set(counts["instance"].tolist())) == 3
         cup = counts["class_id"] == class_id("cup")
         assert counts["count"][cup].sum() == 24, "two cups in twelve frames"
     with np.load(panoptic_map.path("volume.npz"), allow_pickle=False) as volume:
@@ -99,6 +101,25 @@ def test_files_agree(panoptic_map: PanopticMap) -> None:
         assert volume["color"].shape == (len(blocks), 512, 3)
         assert blocks.tolist() == sorted(blocks.tolist(), key=lambda c: c[::-1])
         assert set(np.unique(volume["segment"])) <= {0, *np.unique(segment), *range(1, 50)}
+
+
+def test_every_entity_says_why_it_is_what_it_is(panoptic_map: PanopticMap) -> None:
+    for entity in panoptic_map.info.entities:
+        because = entity.because
+        assert because is not None and because.looks == 12.0
+        assert because.said == {entity.class_name: pytest.approx(1.0, abs=0.02)}
+        is_floor = entity.class_name == "floor"
+        assert because.shape == (BOUND if is_floor else BY_MASKS)
+        assert (because.posterior is None, because.name == "") == (is_floor, is_floor)
+        assert because.posterior is None or because.posterior > 0.9
+
+
+def test_the_layout_lies_with_the_map(panoptic_map: PanopticMap) -> None:
+    layout = panoptic_map.layout
+    assert layout is not None and layout.floor == pytest.approx(0.0, abs=0.005)
+    (floor,) = [plane for plane in layout.planes if plane.bounds]
+    assert floor.kind == "floor" and floor.log_odds == pytest.approx(sum(floor.reasons.values()), abs=0.005)
+    assert panoptic_map.summary["bounds"] == 1 and panoptic_map.summary["masks_dropped"] == 0
 
 
 def test_labels_lie_where_the_blocks_are(panoptic_map: PanopticMap) -> None:
@@ -136,15 +157,19 @@ def test_same_bytes_twice_and_with_another_number_of_threads(
 
 
 def test_background_frames_cast_no_vote(tmp_path: Path) -> None:
-    # In half of the frames the first cup is not predicted: it stays one cup with six observations.
+    # In half of the frames the first cup is not predicted: it stays one thing with six observations, and as many looks
+    # at so large a cup said nothing, it has no name.
     scene = write_scene(tmp_path / "s", background={index: (3,) for index in range(0, 12, 2)})
     info = fuse(tmp_path / "map", *scene).info
-    cups = sorted(e.observations for e in info.entities if e.class_name == "cup")
-    assert cups == [6, 12]
-    # Never predicted: no entity, and its surface is nobody's.
+    things = sorted((e.observations, e.class_name) for e in info.entities if e.class_name != "floor")
+    assert things == [(6, "object"), (12, "cup"), (12, "table")]
+    # Never predicted: a piece that geometry cuts from the table.
     scene = write_scene(tmp_path / "n", background={index: (3,) for index in range(12)})
     info = fuse(tmp_path / "none", *scene).info
-    assert sorted(e.class_name for e in info.entities) == ["cup", "floor", "table"]
+    assert sorted(e.class_name for e in info.entities) == ["cup", "floor", "object", "table"]
+    (piece,) = [e for e in info.entities if e.class_name == "object"]
+    assert np.allclose(np.add(piece.box_minimum, piece.box_maximum)[:2] / 2, (-0.3, 0.0), atol=0.03)
+    assert piece.because is not None and piece.because.shape == PIECE and piece.because.name == "nobody named it"
 
 
 def test_frames_without_pose_or_depth_are_skipped_and_counted(tmp_path: Path) -> None:

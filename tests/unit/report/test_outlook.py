@@ -29,7 +29,7 @@ def test_a_good_run_is_said_to_be_one() -> None:
 def test_each_fault_is_named_with_what_to_do() -> None:
     faults = [
         (changed("sequence", dropped=30), "30 of 60 frames could not be used", "inspect LOG"),
-        (changed("segments", label="geometric segments, class-agnostic"), "what things are", "--words"),
+        (changed("segments", label="geometry alone, class-agnostic"), "what things are", "--words"),
         (changed("contact_graph", floor="none"), "the floor", "record the floor"),
         (changed("contact_graph", uncertain=5), "what 5 of 10 things stand on", "come closer"),
         (changed("cad_scene", cad=1, mesh=9), "9 of 10 things keep their scanned mesh", "walk around"),
@@ -64,6 +64,6 @@ def test_what_was_not_measured_is_not_praised() -> None:
 
 
 def test_it_fits_on_a_screen() -> None:
-    lines = changed("segments", label="geometric segments, class-agnostic").lines()
+    lines = changed("segments", label="geometry alone, class-agnostic").lines()
     assert len(lines) <= 24 and all(len(line) <= 120 for line in lines)
     assert outlook({}).lines() == []

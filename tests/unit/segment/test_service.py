@@ -39,9 +39,12 @@ from scenewright.stages.kit.services.segmentation_protocol import (
     split_multipart,
 )
 from scenewright.stages.kit.stage import Context
+from scenewright.stages.segment.backends.geometric.backend import GeometricBackend
 from scenewright.stages.segment.backends.service import reply_cache
 from scenewright.stages.segment.backends.service.server import SegmentationServer
 from scenewright.stages.segment.choice import BackendRequest, choose_backend
+from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 from scenewright.stages.segment.parameters import STAGE, SegmentParameters
 from scenewright.stages.segment.registry import all_backends, check_backend
 from scenewright.stages.segment.settings import geometric_settings
@@ -67,7 +70,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def segment(room: Written, out: Path, backend: str, *, force: bool = False, **options: Any) -> Segments:
     out.mkdir(parents=True)
     context = Context(output=out, seed=0, device="cpu", progress=SilentProgress(), force=force)
-    fast = {} if backend == "geometric" else FAST
+    fast = FAST if backend.startswith("http") else {}
     parameters = SegmentParameters(backend=backend, **{**fast, **options})
     return run(room.sequence, parameters=parameters, context=context)
 
@@ -85,8 +88,8 @@ def serving(server: ThreadingHTTPServer) -> Iterator[str]:
         thread.join()
 
 
-def reference_server(**options: Any) -> SegmentationServer:
-    parameters = SegmentParameters(backend="geometric", **options)
+def reference_server() -> SegmentationServer:
+    parameters = SegmentParameters(backend="geometric")
     backend = choose_backend(BackendRequest(parameters))
     return SegmentationServer(
         "127.0.0.1", 0, backend, geometric_settings(parameters), revision="r1", required=("depth",)
@@ -161,15 +164,32 @@ def shape_of(room: Written) -> tuple[int, int]:
 # ---- round trip ----------------------------------------------------------------------------------------------------
 
 
-def test_the_reference_server_equals_the_local_backend(room: Written, tmp_path: Path) -> None:
+def a_mask_each(self: GeometricBackend, frame: Frame, geometric: GeometricFrame, random: Any) -> PanopticFrame:
+    numbers = np.unique(geometric.labels[geometric.labels > 0]).tolist()
+    mask = PanopticMask(load_vocabulary().by_name("chair").id, True, 0.5)
+    return PanopticFrame(geometric.labels, dict.fromkeys(numbers, mask))
+
+
+def test_the_reference_server_equals_the_local_backend(
+    room: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(GeometricBackend, "__call__", a_mask_each)
     local = segment(room, tmp_path / "local", "geometric")
+    assert local.summary["named_share"] == 1
     with serving(reference_server()) as address:
         remote = segment(room, tmp_path / "remote", address)
     ours, theirs = payload(local), payload(remote)
     assert ours[1] == theirs[1]  # every pixel of every frame
     assert [entry.segments for entry in local.info.frames] == [entry.segments for entry in remote.info.frames]
     assert remote.info.backend == "masks"
-    assert remote.info.label.startswith("masks of geometric segments, class-agnostic r1 labels ")
+    assert remote.info.label.startswith(f"masks of {local.info.label} r1 labels ")
+    assert local.outcome == remote.outcome == "ok"
+
+
+def test_a_service_that_names_nothing_is_empty(room: Written, tmp_path: Path) -> None:
+    """It was asked for names; `geometric`, which it serves, is not."""
+    with serving(reference_server()) as address:
+        assert segment(room, tmp_path / "remote", address).outcome == "empty"
 
 
 def test_foreign_categories_are_mapped_by_name(room: Written, tmp_path: Path) -> None:

@@ -90,6 +90,8 @@ class MasksBackend:
         if not self._labels:
             logger.info("%s: says no classes (classes.json would): every mask is an object", self._root)
         self._vocabulary = load_vocabulary()
+        stuff = {entry.name for entry in self._vocabulary.classes if entry.kind == "stuff"}
+        self._behind = frozenset(number for number, label in self._labels.items() if label.class_name in stuff)
         self._settings = request.parameters.score_threshold, request.parameters.small_object_pixels
         self._tally, self._last = Tally(), max(self._places)
         self.label = f"masks of {options.masks_model or self._root.resolve().stem}"
@@ -102,7 +104,8 @@ class MasksBackend:
             return PanopticFrame(np.zeros((height, width), dtype=np.int32))
         least = pixels_at(self._settings[1], (height, width))
         try:
-            masks = self._source.read(picture_index, (height, width), ReadSettings(self._settings[0], least))
+            settings = ReadSettings(self._settings[0], least, self._behind)
+            masks = self._source.read(picture_index, (height, width), settings)
             segments = {number: segment for number, segment in self._named_segments(masks)}
         except BadInput as error:
             raise BadInput(f"frame {frame.index}: {error.message}", hint=error.hint) from None

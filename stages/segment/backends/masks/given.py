@@ -71,6 +71,8 @@ class ReadSettings:
     score_threshold: float
     minimum_pixels: int
     """At the size of the picture."""
+    behind: frozenset[int] = frozenset()
+    """Categories of walls, floors and the like: their masks lie under those of things, whatever their size."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ def flatten(
     Masks under the score threshold are left out. Where no two overlap, nothing else happens. Otherwise, as for the
     instances of a network (stages/segment/naming.py): of masks that are the same the best scored stays (of equals the
     first), then smaller ones lie over larger ones (of equals the later), and what keeps less than half of itself, or
-    less than the least number of pixels, is dropped.
+    less than the least number of pixels, is dropped. Masks of categories that are `behind` lie under all others and
+    keep what is left.
     """
     likely = [k for k, mask in enumerate(told) if mask.score >= settings.score_threshold]
     sizes = {k: int(np.count_nonzero(masks[k])) for k in likely}
@@ -31,13 +32,15 @@ def flatten(
             ids[masks[k]] = k + 1
         return GivenFrame(ids, {k + 1: told[k] for k in likely if sizes[k]}, 0, faint)
     distinct: list[int] = []
-    for k in sorted((k for k in likely if sizes[k]), key=lambda k: (-told[k].score, k)):
+    behind = {k for k in likely if told[k].category in settings.behind}
+    for k in sorted((k for k in likely if sizes[k]), key=lambda k: (k in behind, -told[k].score, k)):
         if not any(_are_same(masks[k], masks[other], sizes[k], sizes[other]) for other in distinct):
             distinct.append(k)
-    for k in sorted(distinct, key=lambda k: (-sizes[k], k)):
+    for k in sorted(distinct, key=lambda k: (k not in behind, -sizes[k], k)):
         ids[masks[k]] = k + 1
     visible = np.bincount(ids.ravel(), minlength=len(told) + 1)
-    large_enough = {k for k in distinct if visible[k + 1] >= max(settings.minimum_pixels, KEPT_SHARE * sizes[k])}
+    least = {k: max(settings.minimum_pixels, 0 if k in behind else KEPT_SHARE * sizes[k]) for k in distinct}
+    large_enough = {k for k in distinct if visible[k + 1] >= least[k]}
     overlapping = sum(1 for k in likely if sizes[k] and (k not in large_enough or visible[k + 1] < sizes[k]))
     ids[~np.isin(ids, [k + 1 for k in large_enough])] = 0
     return GivenFrame(ids, {k + 1: told[k] for k in sorted(large_enough)}, overlapping, faint)

@@ -1,0 +1,1 @@
+"""What bounds a room, by geometry: before any mask counts."""
