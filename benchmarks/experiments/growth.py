@@ -73,7 +73,6 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
     """Fuse `count` frames, in a process of its own; return a row of figures for each window of the walk, the last with
     the extraction."""
     from scenewright.stages.fuse import mapping
-    from scenewright.stages.fuse.closing import MaskSource
     from scenewright.stages.fuse.ours import Ours
     from scenewright.stages.fuse.parameters import FuseParameters
     from scenewright.stages.fuse.stage import new_mapper, write_map
@@ -89,7 +88,7 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
     def extract(mapper: mapping.PanopticMapper) -> int:
         with tempfile.TemporaryDirectory() as folder:
             context = Context(Path(folder), seed=0, device="cpu", progress=SilentProgress())
-            return int(write_map(mapper, load_vocabulary(), MaskSource("benchmark"), {}, context).summary["entities"])
+            return int(write_map(mapper, load_vocabulary(), "benchmark", {}, context).summary["entities"])
 
     def add(mapper: mapping.PanopticMapper, number: int) -> None:
         frame, pose = frame_at(frames, number, standing)
@@ -104,8 +103,9 @@ def fuse_walk(frames: list[CorridorFrame], voxel_size: float, count: int, standi
         clock.taken()
     reset_peak()
     before = memory("VmRSS")
-    merging = Ours(options, frozenset(entry.id for entry in load_vocabulary().classes if entry.kind == "thing"))
-    mapper = mapping.PanopticMapper(options, merging)
+    mapper = new_mapper(options, load_vocabulary())
+    merging = mapper.merging
+    assert isinstance(merging, Ours)
     rows = []
     edges = edges_of(count)
     for start, end in zip(edges[:-1], edges[1:], strict=True):

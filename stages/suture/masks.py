@@ -55,7 +55,8 @@ class EyeMasks:
         self, rig: StereoRig, disparity: np.ndarray | None, pictures: tuple[np.ndarray, np.ndarray] | None = None
     ) -> NeedleObservation:
         """Return what an estimator of the needle is given; `pictures` (H, W, 3) are those that the masks are of."""
-        return NeedleObservation(rig, *self.needle, disparity, *self.thread, *self.hidden, pictures)
+        left_hidden, right_hidden = self.hidden
+        return NeedleObservation(rig, *self.needle, disparity, *self.thread, left_hidden, right_hidden, pictures)
 
 
 MaskMaker = Callable[[Pair], EyeMasks]

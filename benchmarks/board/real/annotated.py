@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scenewright.schemas.cad_scene import CadScene
@@ -82,7 +83,7 @@ def annotated_truth(name: str, sequence: Sequence, folder: Path, outlines: Path 
         told = moved(read_support_annotation(annotation), motion)
         annotation = folder / "annotation.json"
         annotation.write_text(json.dumps(told.model_dump(mode="json", by_alias=True)), encoding="utf-8")
-    given = {"annotation": annotation, "sequence": sequence.root}
+    given: dict[str, Any] = {"annotation": annotation, "sequence": sequence.root}
     if outlines is not None:
         given["outlines"] = outlines
     return opened(GroundTruth, step("truth supports", folder / "ground_truth", {"every": EVERY}, **given))

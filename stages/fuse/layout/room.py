@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final, Literal
 
 import numpy as np
 from scenewright.stages.fuse.layout.evidence import Scene, evidence
 from scenewright.stages.fuse.layout.planes import CELL, Plane, level_planes, upright_planes
 
-FLOOR, WALL, CEILING = "floor", "wall", "ceiling"
+Kind = Literal["floor", "wall", "ceiling"]
+FLOOR: Final = "floor"
+WALL: Final = "wall"
+CEILING: Final = "ceiling"
 OPENING = 12
 """Narrower gaps between the columns of a wall belong to it: openings, and what hides it [cells]."""
 WITHIN = 0.25
@@ -32,7 +36,7 @@ class Judged:
     """A plane with what speaks for its bounding the room and what against."""
 
     plane: Plane
-    kind: str
+    kind: Kind
     area: float
     """[m^2]"""
     reasons: dict[str, float]
@@ -77,7 +81,7 @@ def find_layout(scene: Scene) -> Layout:
     return Layout(planes, _owners(planes, scene), floor)
 
 
-def _judged(plane: Plane, kind: str, scene: Scene, floor: float, top: float) -> Judged:
+def _judged(plane: Plane, kind: Kind, scene: Scene, floor: float, top: float) -> Judged:
     return Judged(plane, kind, float(scene.areas[plane.members].sum()), evidence(plane, scene, floor, top))
 
 
