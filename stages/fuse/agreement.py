@@ -21,11 +21,14 @@ from scenewright.stages.fuse.relabelling import relabelled
 from scenewright.stages.fuse.surface import Surface
 from scenewright.stages.fuse.votes import Votes
 from scenewright.stages.kit.class_extents import extent_of
+from scipy.spatial import cKDTree
 
 SURE = 0.5
 """Share of looks with a mask of a thing from which on no wall takes its surface: a screen that hangs flat on it."""
 FRAGMENT = 0.2
 """A piece under this share of a thing of its name that it touches is a part of it."""
+REACH = 4.0
+"""A piece stands on what is so close under its foot [voxels]."""
 BY_MASKS = "masks"
 GROWN = "masks, and the piece of which they have a part"
 PIECE = "a piece that geometry cuts"
@@ -103,8 +106,9 @@ def agreed(
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
-    named, labels, reasons = _named(kept, labels, shapes, votes, vocabulary, things)
-    named, labels, reasons = _without_fragments(surface, named, labels, reasons, standing, things - {unnamed}, unnamed)
+    carriers = _carriers(scene.vertices, labels, standing, voxel)
+    named, labels, reasons = _named(kept, labels, shapes, carriers, votes, vocabulary, things)
+    named, labels = _without_fragments(surface, named, labels, standing, things - {unnamed})
     return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
 
 
@@ -132,33 +136,44 @@ def _dropped(
     return reasons
 
 
+def _leading(said: Said | None, classes: frozenset[int]) -> int:
+    """Return the class that was said most, 0 for none."""
+    scores = {} if said is None else {c: s for c, s in said.scores.items() if c in classes}
+    return min(scores, key=lambda c: (-scores[c], c), default=0)
+
+
+def _carriers(
+    vertices: np.ndarray, labelled: LabelledSurface, standing: frozenset[int], voxel: float
+) -> dict[int, int]:
+    """Return {piece that stands on a top: the instance that is closest under it}."""
+    others = np.flatnonzero((labelled.instance > 0) & ~np.isin(labelled.instance, sorted(standing)))
+    if not standing or not len(others):
+        return {}
+    tree, result = cKDTree(vertices[others]), {}
+    for piece in sorted(standing):
+        points = vertices[labelled.instance == piece]
+        if not len(points):
+            continue
+        foot = points[points[:, 2] <= np.quantile(points[:, 2], 0.1)] - [0.0, 0.0, voxel]
+        near, nearest = tree.query(foot, distance_upper_bound=REACH * voxel)
+        found = labelled.instance[others[nearest[np.isfinite(near)]]]
+        if len(found):
+            result[piece] = int(np.bincount(found).argmax())
+    return result
+
+
 def _without_fragments(
     surface: Surface,
     entities: Sequence[ExtractedEntity],
     labelled: LabelledSurface,
-    reasons: Mapping[int, Reason],
     standing: frozenset[int],
     named: frozenset[int],
-    unnamed: int,
-) -> tuple[list[ExtractedEntity], LabelledSurface, dict[int, Reason]]:
-    """Return entities where pieces of the name of a much larger thing that they touch are a part of it, or, where they
-    stand on it, have no name: its masks took them along."""
-    class_of = {e.instance: e.class_id for e in entities if e.class_id in named}
+) -> tuple[list[ExtractedEntity], LabelledSurface]:
+    """Return entities where pieces with the name of a much larger thing that they touch are a part of it, but for those
+    that stand on it."""
+    class_of = {e.instance: e.class_id for e in entities if e.class_id in named and e.instance not in standing}
     whole = absorb_pieces(labelled.instance, surface.faces, class_of, share=FRAGMENT)
-    taken = set(np.unique(labelled.instance[whole != labelled.instance]).tolist())
-    result, class_id, last = [], labelled.class_id.copy(), dict(reasons)
-    for entity in entities:
-        if entity.instance in taken & standing:
-            naming = last[entity.instance].naming
-            assert naming is not None  # it is a thing
-            naming = replace(naming, class_id=unnamed, rule="it stands on a thing of the name that masks gave it")
-            last[entity.instance] = replace(last[entity.instance], naming=naming)
-            class_id[labelled.instance == entity.instance] = unnamed
-            entity = replace(entity, class_id=unnamed)
-        result.append(entity)
-    instance = np.where(np.isin(labelled.instance, sorted(taken & standing)), labelled.instance, whole)
-    kept, labels = relabelled(surface, result, replace(labelled, class_id=class_id), instance.astype(np.int32), {})
-    return kept, labels, last
+    return relabelled(surface, entities, labelled, whole.astype(np.int32), {})
 
 
 def _owners_of_labels(
@@ -177,11 +192,15 @@ def _named(
     entities: Sequence[ExtractedEntity],
     labelled: LabelledSurface,
     shapes: Mapping[int, str],
+    carriers: Mapping[int, int],
     votes: Votes,
     vocabulary: Vocabulary,
     things: frozenset[int],
 ) -> tuple[list[ExtractedEntity], LabelledSurface, dict[int, Reason]]:
-    """Return entities and labels with names, and the reasons by instance."""
+    """Return entities and labels with names, and the reasons by instance.
+
+    `carriers`: what pieces stand on. What masks call this most, they call a piece on it as long as they take it along.
+    """
     unnamed = vocabulary.by_name(UNNAMED).id
     thing_of = _owners_of_labels(entities, labelled, things)
     order = np.argsort(labelled.instance, kind="stable")
@@ -198,7 +217,11 @@ def _named(
         naming, shape = None, shapes.get(entity.instance, BY_MASKS)
         if entity.class_id in things:
             extent = extent_of(np.asarray(entity.mesh.vertices))
-            naming = name_of(said[entity.instance], rates, extent, vocabulary, unnamed)
+            told = said[entity.instance]
+            of_carrier = _leading(said.get(carriers.get(entity.instance, 0)), things - {unnamed})
+            if of_carrier and of_carrier == _leading(told, things - {unnamed}):
+                told = replace(told, scores={c: s for c, s in told.scores.items() if c != of_carrier})
+            naming = name_of(told, rates, extent, vocabulary, unnamed)
             class_id[labelled.instance == entity.instance] = naming.class_id
             entity = replace(entity, class_id=naming.class_id)
         elif entity.instance not in shapes:

@@ -22,7 +22,7 @@ BACKGROUND = 0.15
 DOUBT = float(np.log(3.0))
 """Log odds against any name by a look that finds a thing and does not recognise it."""
 CLASSES = 10
-"""Names between which wrong looks choose."""
+"""Names that a thing may have, and between which wrong looks choose."""
 NAMELESS = 0.4
 """Prior of having no name in the vocabulary."""
 SILENT = 0.1
@@ -109,7 +109,7 @@ def name_of(said: Said, rates: Rates, extent: float, vocabulary: Vocabulary, unn
     silence = np.log(max(1.0 - rates.right - rates.wrong, SILENT)) * silent
     effective = LOOKS * said.looks / (said.looks + LOOKS)
     odds = {
-        c: np.log((1.0 - NAMELESS) / len(possible) / NAMELESS)
+        c: np.log((1.0 - NAMELESS) / CLASSES / NAMELESS)
         + effective
         * (s * np.log(rates.right) + (spoken - s) * np.log(rates.wrong / CLASSES) + silence - doubt * DOUBT - none)
         for c, s in possible.items()
