@@ -158,7 +158,7 @@ def _without_fragments(
         result.append(entity)
     instance = np.where(np.isin(labelled.instance, sorted(taken & standing)), labelled.instance, whole)
     kept, labels = relabelled(surface, result, replace(labelled, class_id=class_id), instance.astype(np.int32), {})
-    return kept, labels, last
+    return kept, labels, {entity.instance: last[entity.instance] for entity in kept}
 
 
 def _owners_of_labels(
