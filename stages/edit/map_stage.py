@@ -19,8 +19,8 @@ from scenewright.stages.kit.formats.map_files import mesh_name, write_arrays
 from scenewright.stages.kit.formats.ply_files import write_ply
 from scenewright.stages.kit.stage import Context
 
-KEPT = ("counts.npz", "volume.npz")
-"""Which masks were seen where, and the voxels: edits say nothing about these."""
+KEPT = ("counts.npz", "volume.npz", "layout.json")
+"""Which masks were seen where, the voxels, and the planes that bound the room: edits say nothing about these."""
 EDITED = "mesh.ply"
 
 
@@ -55,7 +55,7 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
         else:
             write_ply(root / EDITED, state.surface)
         _write_labels(root, state)
-        for name in KEPT if state.turned is None else KEPT[:1]:  # voxels lie along the axes of before
+        for name in KEPT if state.turned is None else KEPT[:1]:  # the others lie along the axes of before
             if panoptic_map.path(name).is_file():
                 shutil.copyfile(panoptic_map.path(name), root / name)
     summary = write_records(records, len(edits_file.edits), context)

@@ -21,6 +21,8 @@ from scipy.spatial import cKDTree
 GREY = 128
 """Grey value, of 255, of surfaces without a colour."""
 HINT = "make the panoptic map again"
+BY_A_PERSON = "a person named it"
+"""Rule of a name, in `because`."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +98,10 @@ class MapState:
 
     def rename(self, instance: int, class_name: str) -> None:
         """Give a thing another class, of which a person is sure."""
-        self.entities[instance] = self.entities[instance].model_copy(
-            update={"class_name": class_name, "confidence": 1.0}
+        before = self.entities[instance]
+        because = before.because and before.because.model_copy(update={"name": BY_A_PERSON, "posterior": 1.0})
+        self.entities[instance] = before.model_copy(
+            update={"class_name": class_name, "confidence": 1.0, "because": because}
         )
         if instance in self._things:
             self._things[instance] = replace(self._things[instance], class_name=class_name)
