@@ -16,6 +16,8 @@ SNAPSHOTS = "snapshots"
 class Because(Model):
     """Why an entity has its surface and its name."""
 
+    instance: int
+    """Of the entity."""
     shape: str
     """How its surface was found."""
     looks: float
@@ -49,8 +51,6 @@ class Entity(Model):
     """Frames that voted for it."""
     segments: tuple[int, ...]
     """Global segment labels l in it."""
-    because: Because | None = Field(default=None, exclude_if=lambda because: because is None)
-    """Absent of scans of others, and of rules other than ours."""
 
 
 class EntitiesFile(Model):
@@ -64,6 +64,15 @@ class EntitiesFile(Model):
     world_from_sequence: Transform | None = Field(default=None, exclude_if=lambda pose: pose is None)
     """How an edit of gravity turned the map; its world is that of the sequence else. Absent otherwise."""
     entities: tuple[Entity, ...]
+
+
+class BecauseFile(Model):
+    """because.json."""
+
+    entities: tuple[Because, ...]
+    """By instance."""
+    dropped: tuple[str, ...] = ()
+    """Why things of masks are no entities."""
 
 
 class Opening(Model):
@@ -117,9 +126,9 @@ class PanopticMap(Artifact):
     blocks sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation
     distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). With `--snapshot-every`
     also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply. Of an
-    annotated scan (`--from-mesh`) there are no counts and no volume. `layout.json` says which planes bound the room and
-    why (`--merging ours` of frames). Of an edited map (`edit map`) `edits.json` says
-    what became of each edit."""
+    annotated scan (`--from-mesh`) there are no counts and no volume. Of frames, by `--merging ours`, `layout.json` says
+    which planes bound the room and why, `because.json` how each entity was found and named. Of an edited map (`edit
+    map`) `edits.json` says what became of each edit."""
 
     kind: ClassVar[str] = "panoptic_map"
     description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"
@@ -134,3 +143,4 @@ class PanopticMap(Artifact):
     info = Document(EntitiesFile, "entities.json")
     edits = OptionalDocument(AppliedEditsFile, "edits.json")
     layout = OptionalDocument(LayoutFile, "layout.json")
+    because = OptionalDocument(BecauseFile, "because.json")

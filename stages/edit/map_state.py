@@ -21,8 +21,6 @@ from scipy.spatial import cKDTree
 GREY = 128
 """Grey value, of 255, of surfaces without a colour."""
 HINT = "make the panoptic map again"
-BY_A_PERSON = "a person named it"
-"""Rule of a name, in `because`."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +56,8 @@ class MapState:
     """[m]"""
     touched: set[int] = field(default_factory=set)
     """Instances whose surface is no longer that of the map that was read."""
+    renamed: set[int] = field(default_factory=set)
+    """Instances whose class a person gave."""
     next_instance: int = 1
     turned: np.ndarray | None = None
     """(4, 4) from the world in which the map was read, where it was turned."""
@@ -98,11 +98,10 @@ class MapState:
 
     def rename(self, instance: int, class_name: str) -> None:
         """Give a thing another class, of which a person is sure."""
-        before = self.entities[instance]
-        because = before.because and before.because.model_copy(update={"name": BY_A_PERSON, "posterior": 1.0})
-        self.entities[instance] = before.model_copy(
-            update={"class_name": class_name, "confidence": 1.0, "because": because}
+        self.entities[instance] = self.entities[instance].model_copy(
+            update={"class_name": class_name, "confidence": 1.0}
         )
+        self.renamed.add(instance)
         if instance in self._things:
             self._things[instance] = replace(self._things[instance], class_name=class_name)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.base import as_vector
-from scenewright.schemas.panoptic_map import Because, EntitiesFile, Entity, LayoutFile
+from scenewright.schemas.panoptic_map import Because, BecauseFile, EntitiesFile, Entity, LayoutFile
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
 from scenewright.stages.fuse.agreement import Agreement, Reason, agreed
 from scenewright.stages.fuse.counts import TripleCounts
@@ -39,11 +39,10 @@ class ClosedMap:
     """Merged segment label of every segment label."""
     layout: LayoutFile | None = None
     """None of maps of other rules than ours."""
-    dropped: tuple[str, ...] = field(default=())
-    """Why things of masks are no entities."""
+    because: BecauseFile | None = None
 
 
-def describe(entity: ExtractedEntity, vocabulary: Vocabulary, reason: Reason | None = None) -> Entity:
+def describe(entity: ExtractedEntity, vocabulary: Vocabulary) -> Entity:
     """Return an entity's row of entities.json."""
     return Entity(
         instance=entity.instance,
@@ -56,15 +55,15 @@ def describe(entity: ExtractedEntity, vocabulary: Vocabulary, reason: Reason | N
         confidence=round(entity.confidence, 6),
         observations=entity.observations,
         segments=entity.segments,
-        because=None if reason is None else told(reason, vocabulary),
     )
 
 
-def told(reason: Reason, vocabulary: Vocabulary) -> Because:
-    """Return a reason as entities.json has it."""
+def told(instance: int, reason: Reason, vocabulary: Vocabulary) -> Because:
+    """Return the reason of an entity as because.json has it."""
     said = sorted(reason.said.scores.items(), key=lambda row: (-row[1], row[0]))[:MOST_SAID]
     naming = reason.naming
     return Because(
+        instance=instance,
         shape=reason.shape,
         looks=round(reason.said.looks, 1),
         said={vocabulary.by_id(c).name: round(score, 3) for c, score in said},
@@ -134,14 +133,16 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progre
                 minimum_area=parameters.unnamed_area,
             )
             entities, labelled = agreement.entities, agreement.labelled
-    reasons = {} if agreement is None else agreement.reasons
     file = EntitiesFile(
         voxel_size=parameters.voxel_size,
         truncation_distance=mapper.truncation_distance,
         frames_integrated=mapper.frames_integrated,
         segmentation=label,
-        entities=tuple(describe(entity, vocabulary, reasons.get(entity.instance)) for entity in entities),
+        entities=tuple(describe(entity, vocabulary) for entity in entities),
     )
-    layout = None if agreement is None else layout_file(agreement.layout, scene)
-    dropped = () if agreement is None else agreement.dropped
-    return ClosedMap(file, entities, surface, labelled, grouping.counts, merged, layout, dropped)
+    closed = ClosedMap(file, entities, surface, labelled, grouping.counts, merged)
+    if agreement is None:
+        return closed
+    rows = tuple(told(entity.instance, agreement.reasons[entity.instance], vocabulary) for entity in entities)
+    layout = layout_file(agreement.layout, scene)
+    return replace(closed, layout=layout, because=BecauseFile(entities=rows, dropped=agreement.dropped))

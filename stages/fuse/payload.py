@@ -30,6 +30,8 @@ def write_meshes(root: Path, closed: ClosedMap) -> None:
     closed.file.write(root / "entities.json")
     if closed.layout is not None:
         closed.layout.write(root / "layout.json")
+    if closed.because is not None:
+        closed.because.write(root / "because.json")
     write_ply(root / "mesh.ply", ColoredMesh(closed.surface.vertices, closed.surface.faces, closed.surface.colors))
     for entity in closed.entities:
         write_ply(root / mesh_name(entity.instance), entity.mesh)

@@ -101,7 +101,8 @@ def write_map(
     }
     if closed.layout is not None:
         summary["bounds"] = sum(plane.bounds for plane in closed.layout.planes)
-        summary["masks_dropped"] = len(closed.dropped)
+    if closed.because is not None:
+        summary["masks_dropped"] = len(closed.because.dropped)
     return PanopticMap(context.output, outcome="ok" if len(closed.surface.faces) else "empty", summary=summary)
 
 

@@ -190,7 +190,7 @@ def test_a_name_that_its_size_speaks_against_goes_and_the_thing_stays() -> None:
     masks.add(8, masks.owner == 2, class_id("cup"), 0.6)
     found = masks.agreed()
     assert check_whole(found)[8] == "object" and found.reasons[8].shape == BY_MASKS
-    row = told(found.reasons[8], VOCABULARY)
+    row = told(8, found.reasons[8], VOCABULARY)
     assert row.name == "no thing of its size has its name" and row.said == {"cup": 0.6}
     assert row.looks == LOOKS and row.posterior == 1.0 and row.runners_up == {}
 

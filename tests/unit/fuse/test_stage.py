@@ -104,9 +104,11 @@ def test_files_agree(panoptic_map: PanopticMap) -> None:
 
 
 def test_every_entity_says_why_it_is_what_it_is(panoptic_map: PanopticMap) -> None:
+    assert panoptic_map.because is not None and panoptic_map.because.dropped == ()
+    reasons = {row.instance: row for row in panoptic_map.because.entities}
     for entity in panoptic_map.info.entities:
-        because = entity.because
-        assert because is not None and because.looks == 12.0
+        because = reasons[entity.instance]
+        assert because.looks == 12.0
         assert because.said == {entity.class_name: pytest.approx(1.0, abs=0.02)}
         is_floor = entity.class_name == "floor"
         assert because.shape == (BOUND if is_floor else BY_MASKS)
@@ -165,11 +167,14 @@ def test_background_frames_cast_no_vote(tmp_path: Path) -> None:
     assert things == [(6, "object"), (12, "cup"), (12, "table")]
     # Never predicted: a piece that geometry cuts from the table.
     scene = write_scene(tmp_path / "n", background={index: (3,) for index in range(12)})
-    info = fuse(tmp_path / "none", *scene).info
+    made = fuse(tmp_path / "none", *scene)
+    info = made.info
     assert sorted(e.class_name for e in info.entities) == ["cup", "floor", "object", "table"]
     (piece,) = [e for e in info.entities if e.class_name == "object"]
     assert np.allclose(np.add(piece.box_minimum, piece.box_maximum)[:2] / 2, (-0.3, 0.0), atol=0.03)
-    assert piece.because is not None and piece.because.shape == PIECE and piece.because.name == "nobody named it"
+    assert made.because is not None
+    (because,) = [row for row in made.because.entities if row.instance == piece.instance]
+    assert (because.shape, because.name) == (PIECE, "nobody named it")
 
 
 def test_frames_without_pose_or_depth_are_skipped_and_counted(tmp_path: Path) -> None:
