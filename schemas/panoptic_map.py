@@ -127,8 +127,8 @@ class PanopticMap(Artifact):
     distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). With `--snapshot-every`
     also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply. Of an
     annotated scan (`--from-mesh`) there are no counts and no volume. Of frames, by `--merging ours`, `layout.json` says
-    which planes bound the room and why, `because.json` how each entity was found and named. Of an edited map (`edit map`) `edits.json` says
-    what became of each edit."""
+    which planes bound the room and why, `because.json` how each entity was found and named. Of an edited map (`edit
+    map`) `edits.json` says what became of each edit."""
 
     kind: ClassVar[str] = "panoptic_map"
     description: ClassVar[str] = "labelled TSDF map: whole mesh, a mesh per entity, counts"

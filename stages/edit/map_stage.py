@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.base import as_transform
-from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.panoptic_map import BecauseFile, PanopticMap
 from scenewright.stages.edit.anchoring import Fitting
 from scenewright.stages.edit.applying import apply_edits
 from scenewright.stages.edit.edits_file import read_edits
@@ -19,9 +19,11 @@ from scenewright.stages.kit.formats.map_files import mesh_name, write_arrays
 from scenewright.stages.kit.formats.ply_files import write_ply
 from scenewright.stages.kit.stage import Context
 
-KEPT = ("counts.npz", "volume.npz")
-"""Which masks were seen where, and the voxels: edits say nothing about these."""
+KEPT = ("counts.npz", "volume.npz", "layout.json")
+"""Which masks were seen where, the voxels, and the planes that bound the room: edits say nothing about these."""
 EDITED = "mesh.ply"
+BY_A_PERSON = "a person named it"
+"""Rule of a name, in because.json."""
 
 
 def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters, context: Context) -> PanopticMap:
@@ -55,12 +57,22 @@ def run(panoptic_map: PanopticMap, edits: Path, *, parameters: EditMapParameters
         else:
             write_ply(root / EDITED, state.surface)
         _write_labels(root, state)
-        for name in KEPT if state.turned is None else KEPT[:1]:  # voxels lie along the axes of before
+        if panoptic_map.because is not None:
+            _reasons(panoptic_map.because, state).write(root / "because.json")
+        for name in KEPT if state.turned is None else KEPT[:1]:  # the others lie along the axes of before
             if panoptic_map.path(name).is_file():
                 shutil.copyfile(panoptic_map.path(name), root / name)
     summary = write_records(records, len(edits_file.edits), context)
     summary |= {"entities": len(entities), "vertices": len(state.surface.vertices)}
     return PanopticMap(root, outcome=outcome_of(records), summary=summary)
+
+
+def _reasons(because: BecauseFile, state: MapState) -> BecauseFile:
+    """Return the reasons of the things that stay; a person's name has that one."""
+    rows = [row for row in because.entities if row.instance in state.entities]
+    named = {"name": BY_A_PERSON, "posterior": 1.0}
+    told = tuple(row.model_copy(update=named) if row.instance in state.renamed else row for row in rows)
+    return because.model_copy(update={"entities": told})
 
 
 def _write_labels(root: Path, state: MapState) -> None:

@@ -56,6 +56,8 @@ class MapState:
     """[m]"""
     touched: set[int] = field(default_factory=set)
     """Instances whose surface is no longer that of the map that was read."""
+    renamed: set[int] = field(default_factory=set)
+    """Instances whose class a person gave."""
     next_instance: int = 1
     turned: np.ndarray | None = None
     """(4, 4) from the world in which the map was read, where it was turned."""
@@ -99,6 +101,7 @@ class MapState:
         self.entities[instance] = self.entities[instance].model_copy(
             update={"class_name": class_name, "confidence": 1.0}
         )
+        self.renamed.add(instance)
         if instance in self._things:
             self._things[instance] = replace(self._things[instance], class_name=class_name)
 

@@ -95,7 +95,9 @@ def agreed(
         stuff = (instance > 0) & ~(is_thing & ~bounded)
         things_of = np.where(stuff, 0, instance)
         cloud = Cloud(scene.vertices - [0.0, 0.0, layout.floor or 0.0], scene.normals, voxel)
-        grown = grown_things(cloud, things_of, stuff, minimum_area)
+        size = np.maximum(np.bincount(things_of), 1)
+        sure = np.flatnonzero(np.bincount(things_of, weights=own_told) >= SURE * size)
+        grown = grown_things(cloud, things_of, stuff, frozenset(sure.tolist()), minimum_area)
         of_thing = np.where(grown != things_of, 1.0, own_told)
         found = pieces_beside(cloud, grown, stuff, of_thing, minimum_area)
         shapes |= dict.fromkeys(np.unique(grown[grown != things_of]).tolist(), GROWN)
@@ -109,7 +111,7 @@ def agreed(
     carriers = _carriers(scene.vertices, labels, standing, voxel)
     named, labels, reasons = _named(kept, labels, shapes, carriers, votes, vocabulary, things)
     named, labels = _without_fragments(surface, named, labels, standing, things - {unnamed})
-    return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
+    return Agreement(named, labels, layout, {e.instance: reasons[e.instance] for e in named}, tuple(dropped.values()))
 
 
 def _dropped(

@@ -398,10 +398,13 @@ HELD = 0.3
 """A piece of which a single thing of masks has this share is that thing."""
 
 
-def grown_things(cloud: Cloud, instance: np.ndarray, room: np.ndarray, minimum_area: float) -> np.ndarray:
+def grown_things(
+    cloud: Cloud, instance: np.ndarray, room: np.ndarray, sure: frozenset[int], minimum_area: float
+) -> np.ndarray:
     """Return the things (V,) of masks, 0 none, each with all of the piece of which it alone has a part.
 
-    Masks that have only the seat of a chair, or half of a sofa, are of the whole; arguments as in `pieces_beside`.
+    Masks that have only the seat of a chair, or half of a sofa, are of the whole; those that are `sure` of a thing have
+    all of it. Arguments as in `pieces_beside`.
     """
     piece = pieces_of(cloud, ~room, minimum_area)
     result = instance.copy()
@@ -414,6 +417,6 @@ def grown_things(cloud: Cloud, instance: np.ndarray, room: np.ndarray, minimum_a
         if len(within) != 1 or not unnamed:
             continue
         thing = int(within[0])
-        if inside[thing] >= HELD * own.sum() and inside[thing] >= 0.6 * sizes[thing]:
+        if thing not in sure and inside[thing] >= HELD * own.sum() and inside[thing] >= 0.6 * sizes[thing]:
             result[own & (instance == 0)] = thing
     return result

@@ -14,16 +14,19 @@ from scenewright.cli.edit_forms import kinds_of
 from scenewright.cli.main import run as scenewright
 from scenewright.schemas.edits import AddJoint, AnyEdit, AppliedEdit, MapEdit
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.panoptic_map import Because, BecauseFile, LayoutFile, LayoutPlane, PanopticMap
 from scenewright.stages.edit.anchoring import Fitting, anchor_of
 from scenewright.stages.edit.applying import apply_edits
 from scenewright.stages.edit.edits_file import append_edits, line_of, read_edits
 from scenewright.stages.edit.map_edits import MAP_EDITS, box_surface
+from scenewright.stages.edit.map_stage import BY_A_PERSON, run
 from scenewright.stages.edit.map_state import MapState, read_state
 from scenewright.stages.edit.parameters import EditMapParameters
 from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
 from scenewright.stages.kit.geometry.boxes import gravity_aligned_box
 from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.stage import Context
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -79,6 +82,35 @@ def test_edits_land_on_the_same_things_whatever_their_numbers(seen: PanopticMap,
     assert there.entities[40].confidence == 1.0
     # The surface of the deleted cup stays, without a name.
     assert len(there.instance) == len(read_state(other)[0].instance) and (there.instance == 0).sum() > 20
+
+
+def test_the_layout_and_the_reasons_stay_and_a_new_name_says_whose_it_is(tmp_path: Path) -> None:
+    room = room_map(tmp_path / "map")
+    row = Because(instance=1, shape="masks", looks=9.0, said={"cup": 0.5}, name="the likeliest", posterior=0.7)
+    rows = tuple(row.model_copy(update={"instance": e.instance}) for e in room.info.entities)
+    BecauseFile(entities=rows, dropped=("few looks",)).write(room.path("because.json"))
+    plane = LayoutPlane(
+        kind="floor",
+        bounds=True,
+        normal=(0, 0, 1),
+        offset=0,
+        area=4,
+        start=(0, 0, 0),
+        end=(2, 2, 0),
+        reasons={},
+        log_odds=1,
+    )
+    LayoutFile(floor=0.0, planes=(plane,)).write(room.path("layout.json"))
+    edits = tmp_path / "edits.toml"
+    append_edits(edits, [edit("rename", room, CUP, **{"class": "bottle"}), edit("delete", room, CABINET)])
+    context = Context(output=tmp_path / "edited", seed=0, device="cpu", progress=SilentProgress())
+    found = run(room, edits, parameters=EditMapParameters(), context=context)
+    assert found.layout is not None and found.layout == room.layout
+    assert found.because is not None and found.because.dropped == ("few looks",)
+    reasons = {row.instance: row for row in found.because.entities}
+    assert set(reasons) == {row.instance for row in rows} - {CABINET}, "of what was deleted there is none"
+    assert reasons[CUP] == row.model_copy(update={"instance": CUP, "name": BY_A_PERSON, "posterior": 1.0})
+    assert reasons[TABLE] == row.model_copy(update={"instance": TABLE})
 
 
 def test_what_no_longer_fits_is_a_conflict_and_changes_nothing(seen: PanopticMap, tmp_path: Path) -> None:

@@ -141,6 +141,17 @@ def test_a_part_of_a_chair_is_the_whole_chair() -> None:
     assert (found.labelled.instance[masks.owner == 2] == 8).mean() > 0.95
 
 
+def test_a_fragment_of_a_thing_of_its_name_is_part_of_it() -> None:
+    masks = Masks((CHAIR_AT, COUNTER))
+    end = (masks.owner == 3) & (masks.vertices[:, 0] > 1.44)
+    masks.add(7, (masks.owner == 3) & ~end, CABINET, 0.8).add(9, end, CABINET, 0.8)
+    masks.add(8, masks.owner == 2, CHAIR, 0.7)
+    found = masks.agreed()
+    assert 9 not in check_whole(found) and at(found, end) == 7
+    masks.add(9, end, CHAIR, 0.8)
+    assert check_whole(masks.agreed())[9] == "chair", "no part of what has another name"
+
+
 def test_a_mask_that_runs_over_a_plane_is_dropped_with_the_reason() -> None:
     masks = Masks((CHAIR_AT, COUNTER))
     patch = (masks.owner == 0) & (np.abs(masks.vertices[:, :2] - [1.0, -0.8]) < 0.4).all(axis=1)
@@ -179,7 +190,7 @@ def test_a_name_that_its_size_speaks_against_goes_and_the_thing_stays() -> None:
     masks.add(8, masks.owner == 2, class_id("cup"), 0.6)
     found = masks.agreed()
     assert check_whole(found)[8] == "object" and found.reasons[8].shape == BY_MASKS
-    row = told(found.reasons[8], VOCABULARY)
+    row = told(8, found.reasons[8], VOCABULARY)
     assert row.name == "no thing of its size has its name" and row.said == {"cup": 0.6}
     assert row.looks == LOOKS and row.posterior == 1.0 and row.runners_up == {}
 
