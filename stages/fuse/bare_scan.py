@@ -17,6 +17,10 @@ from scenewright.stages.kit.geometry.cells import cell_keys
 from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 
 
+TOP, LOWEST_CEILING = 0.15, 2.0
+"""Level surface so close to the highest point, and so high over the lowest, faces down [m]."""
+
+
 def told_apart(scan: AnnotatedScan, voxel: float, minimum_area: float, where: Path) -> AnnotatedScan:
     """Return the scan with an instance for each piece of surface that stands free, and floor, walls and ceiling.
 
@@ -56,8 +60,10 @@ def _cubes(points: np.ndarray, edge: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _into_the_room(points: np.ndarray) -> np.ndarray:
-    """Return normals (N, 3) of points: up where it is level, else into the middle of the scan."""
+    """Return normals (N, 3) of points: into the middle of the scan; up where it is level, but for the very top."""
     normals = local_axes(points)[1][:, :, 0]
     across = np.einsum("nk,nk->n", normals[:, :2], np.median(points[:, :2], axis=0) - points[:, :2])
-    flip = np.where(np.abs(normals[:, 2]) > 1 - LEVEL, normals[:, 2] < 0, across < 0)
+    height = points[:, 2] - points[:, 2].min()
+    at_top = (height > height.max() - TOP) & (height > LOWEST_CEILING)
+    flip = np.where(np.abs(normals[:, 2]) > 1 - LEVEL, (normals[:, 2] < 0) != at_top, across < 0)
     return np.where(flip[:, None], -normals, normals)

@@ -40,8 +40,8 @@ LEAST_RISE = 0.75
 voxel over it."""
 BENDING_STEPS = 5
 """Times the bending of a top is fitted anew without its outliers."""
-FEWEST = 50
-"""Vertices of a part that is looked at, and of a thing on a level top."""
+SMALL = 0.02
+"""Area of a part that is looked at, and of a thing on a level top [m^2]."""
 STACKED_SHARE, STACKED_GAP = 0.5, 0.35
 """Parts above each other with this share of the smaller footprint in common, and this gap at most [m], are one."""
 SCRAP_SHARE, SCRAP_DISTANCE = 0.25, 0.1
@@ -59,6 +59,11 @@ class Cloud:
     vertices: np.ndarray
     normals: np.ndarray
     voxel: float
+
+    @property
+    def fewest(self) -> int:
+        """Vertices that stand for SMALL."""
+        return round(SMALL / self.voxel**2)
 
 
 @dataclass(frozen=True)
@@ -147,7 +152,7 @@ def cut_parts(cloud: Cloud, parts: np.ndarray) -> tuple[np.ndarray, set[int], di
         rise = _over_top(points, cloud.vertices[top.members], cloud.voxel)
         # What is over the top by less is of it; what lies flat on it begins lower than what stands.
         rest = np.flatnonzero(np.where(inside, (rise > LEAST_RISE * cloud.voxel) | (over < -RISE), True))
-        for own in _groups(connected(points[rest], cloud.voxel)):
+        for own in _groups(connected(points[rest], cloud.voxel), cloud.fewest):
             group = rest[own]
             rising, below = over[group] > RISE, over[group] < -RISE
             if not below.any():
@@ -156,9 +161,9 @@ def cut_parts(cloud: Cloud, parts: np.ndarray) -> tuple[np.ndarray, set[int], di
                     standing.add(after)
                     after += 1
                 continue
-            if rising.sum() < FEWEST or len(top.members) < TOP_SHARE * len(of_part):
+            if rising.sum() < cloud.fewest or len(top.members) < TOP_SHARE * len(of_part):
                 continue
-            if ((over[group] > -APRON) & below & inside[group]).sum() >= FEWEST:
+            if ((over[group] > -APRON) & below & inside[group]).sum() >= cloud.fewest:
                 # It hangs together with what is under the top: cut straight down.
                 outline = Footprint(points[group[rising], :2], cloud.voxel)
                 at_rim = top.footprint.depth(points[group]) < BACK
@@ -187,7 +192,7 @@ def join_parts(
     """
     result = parts.copy()
     names, sizes = np.unique(parts[parts >= 0], return_counts=True)
-    names = np.array([name for name in names[sizes >= FEWEST] if name not in standing], int)
+    names = np.array([name for name in names[sizes >= cloud.fewest] if name not in standing], int)
     members = {name: np.flatnonzero(parts == name) for name in names}
     cells = {name: _cells(cloud.vertices[members[name]], cloud.voxel) for name in names}
     trees = {name: cKDTree(cloud.vertices[members[name]]) for name in names}
@@ -240,7 +245,7 @@ def numbered_pieces(
         own = np.flatnonzero(parts == part)
         extent, low = np.ptp(cloud.vertices[own], axis=0), cloud.vertices[own, 2].min()
         large = len(own) * cloud.voxel**2 >= minimum_area and extent[:2].max() >= SMALLEST
-        if (large and extent[2] >= LEAST_HEIGHT and low < HIGHEST) or (len(own) >= FEWEST and part in cut):
+        if (large and extent[2] >= LEAST_HEIGHT and low < HIGHEST) or (len(own) >= cloud.fewest and part in cut):
             pieces.append(own)
     piece = np.zeros(len(cloud.vertices), np.int32)
     ordered = sorted(pieces, key=lambda own: (-len(own), own[0]))
@@ -262,7 +267,7 @@ def _tops(cloud: Cloud, parts: np.ndarray) -> list[_Top]:
     return sorted(tops, key=lambda top: (-len(top.members), top.members[0]))
 
 
-def _groups(labels: np.ndarray, fewest: int = FEWEST) -> list[np.ndarray]:
+def _groups(labels: np.ndarray, fewest: int) -> list[np.ndarray]:
     """Return the numbers of the members of each label (N,) that has enough, in the order of the labels."""
     if not len(labels):
         return []

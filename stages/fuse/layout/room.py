@@ -120,9 +120,8 @@ def _stands_before(plane: Plane, wall: Plane, scene: Scene) -> bool:
 def _owners(planes: Sequence[Judged], scene: Scene) -> np.ndarray:
     """Return the plane (V,) of every vertex, numbered from 1; the better plane comes first."""
     owner = np.zeros(len(scene.vertices), np.int32)
-    for number, each in enumerate(planes, 1):
-        if each.log_odds <= 0:
-            break
+    bounds = [(number, each) for number, each in enumerate(planes, 1) if each.log_odds > 0]
+    for number, each in sorted(bounds, key=lambda row: not row[1].plane.is_level):  # a floor goes up to the wall
         distance = each.plane.distance(scene.vertices)
         behind = _depth_of(each, planes, scene)
         of_plane = (distance < BEFORE) & (distance > -behind)

@@ -135,7 +135,7 @@ def test_without_masks_all_is_found_and_nothing_named() -> None:
 
 def test_a_part_of_a_chair_is_the_whole_chair() -> None:
     masks = Masks((CHAIR_AT, COUNTER))
-    masks.add(8, (masks.owner == 2) & (masks.vertices[:, 2] > 0.4), CHAIR, 0.7)
+    masks.add(8, (masks.owner == 2) & (masks.vertices[:, 2] > 0.4), CHAIR, 0.45)
     found = masks.agreed()
     assert check_whole(found)[8] == "chair" and found.reasons[8].shape == GROWN
     assert (found.labelled.instance[masks.owner == 2] == 8).mean() > 0.95

@@ -168,12 +168,12 @@ def test_a_thing_has_the_rest_of_the_piece_of_which_it_alone_has_a_part() -> Non
     owner, x = scene[2], scene[0][:, 0]
     half = np.where((owner == 2) & (x < -0.7), 5, 0)
     cloud = cloud_of(scene)
-    grown = grown_things(cloud, half, owner < 2, 0.05)
+    grown = grown_things(cloud, half, owner < 2, frozenset(), 0.05)
     assert (grown[owner == 2] == 5).all() and not grown[owner == 3].any()
     two = np.where((owner == 2) & (x > -0.6), 6, half)
-    assert (grown_things(cloud, two, owner < 2, 0.05) == two).all(), "two things share it"
+    assert (grown_things(cloud, two, owner < 2, frozenset(), 0.05) == two).all(), "two things share it"
     little = np.where((owner == 3) & (x < 1.5 * HELD / 3), 8, 0)
-    assert (grown_things(cloud, little, owner < 2, 0.05) == little).all()
+    assert (grown_things(cloud, little, owner < 2, frozenset(), 0.05) == little).all()
 
 
 def test_a_scan_that_nobody_labelled_leaves_floor_and_walls_out() -> None:
