@@ -16,7 +16,6 @@ from scenewright.stages.fuse.point_surface import local_axes
 from scenewright.stages.kit.geometry.cells import cell_keys
 from scenewright.stages.kit.geometry.point_clouds import vertex_normals
 
-
 TOP, LOWEST_CEILING = 0.15, 2.0
 """Level surface so close to the highest point, and so high over the lowest, faces down [m]."""
 

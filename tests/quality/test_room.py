@@ -42,7 +42,7 @@ def figures(folder: Path) -> dict[str, float]:
     step("synthesize", "truth", *SIZE, "--seed", "3", library="library")
     step("ingest", "sequence", log="truth/log.mcap")
     step("segment", "segments", "--backend", "ground-truth", "--corruption", "0.2", sequence="sequence")
-    step("fuse", "map", "--voxel-size", "0.03", sequence="sequence", segments="segments")
+    step("fuse", "map", sequence="sequence", segments="segments")
     step("graph", "graph", panoptic_map="map")
     step("cad", "cad", contact_graph="graph", panoptic_map="map", library="library")
     shown = {"panoptic_map": "map", "contact_graph": "graph", "cad_scene": "cad", "cad_library": "library"}
