@@ -8,7 +8,7 @@ import numpy as np
 from scenewright.schemas.base import as_vector
 from scenewright.schemas.panoptic_map import Because, BecauseFile, EntitiesFile, Entity, LayoutFile
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
-from scenewright.stages.fuse.agreement import Agreement, Reason, agreed
+from scenewright.stages.fuse.agreement import Agreement, agreed
 from scenewright.stages.fuse.counts import TripleCounts
 from scenewright.stages.fuse.extraction import ExtractedEntity, ExtractionSettings, LabelledSurface, extract_entities
 from scenewright.stages.fuse.layout.evidence import Scene
@@ -17,6 +17,7 @@ from scenewright.stages.fuse.mapping import PanopticMapper
 from scenewright.stages.fuse.ours import Ours
 from scenewright.stages.fuse.smoothing import smoothed_tsdf
 from scenewright.stages.fuse.surface import Surface, extract_surface
+from scenewright.stages.fuse.testimony import Reason
 from scenewright.stages.fuse.votes import Votes
 from scenewright.stages.kit.formats.map_files import mesh_name
 from scenewright.stages.kit.geometry.point_clouds import vertex_areas, vertex_normals

@@ -1,8 +1,9 @@
 """What a thing is called: by what all looks at it said, and by their silence.
 
 Ours. Each look either names the thing, names it wrongly, or says nothing. How often the masks of this log name things
-says how much their silence means. The name with the largest posterior is taken, if it is likely enough and a thing of
-that size can have it; else the thing is an `object`.
+says how much their silence means. Rooms hold some things more often than others, and each within a range of sizes:
+that is the prior. The name with the largest posterior is taken if looks are evidence for it; else it is an `object`.
+A mask that calls a thing a wall, floor or window is silent about which thing it is.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.schemas.class_counts import class_counts
 from scenewright.schemas.vocabulary import Vocabulary
 from scenewright.stages.fuse.votes import Votes
-from scenewright.stages.kit.class_extents import is_plausible
+from scenewright.stages.kit.class_extents import LARGEST_EXTENT, SMALLEST_EXTENT, is_plausible
 
 WRONG = 0.05
 """Least share of looks at a thing that give it a wrong name."""
@@ -22,17 +24,21 @@ BACKGROUND = 0.15
 DOUBT = float(np.log(3.0))
 """Log odds against any name by a look that finds a thing and does not recognise it."""
 CLASSES = 10
-"""Names that a thing may have, and between which wrong looks choose."""
-NAMELESS = 0.4
-"""Prior of having no name in the vocabulary."""
+"""Names between which wrong looks choose."""
+SPREAD = float(np.log(4.0 / 0.05))
+"""Things without a name have any extent from 0.05 to 4 m: width of its logarithm."""
+USUAL_SPREAD = float(np.log(4.0))
+"""Width of the logarithm of the extent of a class of which no smallest extent is known."""
 SILENT = 0.1
 """Least share of looks at a thing that say nothing."""
 SELDOM = 0.2
 """Least share of looks that name a thing."""
 LOOKS = 8.0
 """Looks are alike: however many there are, they count for fewer than so many."""
-LIKELY = 0.6
+LIKELY = 0.5
 """Posterior from which on a name is given."""
+EVIDENCE = float(np.log(3.0))
+"""Log Bayes factor from which on looks are evidence for a name, whatever its prior (Kass and Raftery 1995)."""
 UNUSUAL = 1.5
 """A thing may be this much larger than usual where masks are as sure of its name as they usually are."""
 
@@ -103,25 +109,33 @@ def name_of(said: Said, rates: Rates, extent: float, vocabulary: Vocabulary, unn
     names = {c: s for c, s in said.scores.items() if c != unnamed and vocabulary.by_id(c).kind == "thing"}
     possible = {c: s for c, s in names.items() if _can_be(vocabulary.by_id(c).name, extent, s >= rates.right)}
     doubt = said.scores.get(unnamed, 0.0)
-    spoken = sum(s for c, s in said.scores.items() if c != unnamed)
+    spoken = sum(names.values())
     silent = max(0.0, 1.0 - spoken - doubt)
     none = np.log(1.0 - rates.background) * silent + np.log(rates.background / CLASSES) * spoken
     silence = np.log(max(1.0 - rates.right - rates.wrong, SILENT)) * silent
     effective = LOOKS * said.looks / (said.looks + LOOKS)
-    odds = {
-        c: np.log((1.0 - NAMELESS) / CLASSES / NAMELESS)
-        + effective
+    factors = {
+        c: effective
         * (s * np.log(rates.right) + (spoken - s) * np.log(rates.wrong / CLASSES) + silence - doubt * DOUBT - none)
         for c, s in possible.items()
     }
+    odds = {c: np.log(prior_odds(vocabulary.by_id(c).name)) + factor for c, factor in factors.items()}
     order = sorted(odds, key=lambda c: (-odds[c], c))
     weights = np.exp(np.minimum([odds[c] for c in order], 50.0))
     rows = [(c, round(float(w / (1.0 + weights.sum())), 3)) for c, w in zip(order, weights, strict=True)]
-    if rows and rows[0][1] >= LIKELY:
+    if rows and rows[0][1] >= LIKELY and factors[rows[0][0]] >= EVIDENCE:
         return Naming(*rows[0], tuple(rows[1:3]), "the likeliest of the names that masks gave it")
     left = round(1.0 - sum(p for _, p in rows), 3)
     rule = "no name is likely enough" if rows else "no thing of its size has its name" if names else "nobody named it"
     return Naming(unnamed, left, tuple(rows[:2]), rule)
+
+
+def prior_odds(class_name: str) -> float:
+    """Return how much likelier a thing of a possible extent has the name than none, before anybody said anything."""
+    counts, largest = class_counts(), LARGEST_EXTENT.get(class_name)
+    smallest = SMALLEST_EXTENT.get(class_name)
+    spread = SPREAD if largest is None else USUAL_SPREAD if smallest is None else float(np.log(largest / smallest))
+    return counts.of(class_name) / counts.nameless * SPREAD / spread
 
 
 def _can_be(name: str, extent: float, sure: bool) -> bool:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 from scenewright.schemas.vocabulary import load_vocabulary
-from scenewright.stages.fuse.agreement import BOUND, BY_MASKS, GROWN, PIECE, SURE, UNHEARD, Agreement, agreed
+from scenewright.stages.fuse.agreement import SURE, Agreement, agreed
 from scenewright.stages.fuse.closing import told
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from scenewright.stages.fuse.layout.evidence import Scene
 from scenewright.stages.fuse.relabelling import relabelled
 from scenewright.stages.fuse.surface import Surface
+from scenewright.stages.fuse.testimony import BOUND, BY_MASKS, BY_MOST_LOOKS, GROWN, PIECE
 from scenewright.stages.fuse.votes import Votes
 from scenewright.stages.kit.formats.map_files import cut_mesh, face_labels
 from scenewright.stages.kit.geometry.point_clouds import vertex_areas, vertex_normals
@@ -141,17 +142,6 @@ def test_a_part_of_a_chair_is_the_whole_chair() -> None:
     assert (found.labelled.instance[masks.owner == 2] == 8).mean() > 0.95
 
 
-def test_a_fragment_of_a_thing_of_its_name_is_part_of_it() -> None:
-    masks = Masks((CHAIR_AT, COUNTER))
-    end = (masks.owner == 3) & (masks.vertices[:, 0] > 1.44)
-    masks.add(7, (masks.owner == 3) & ~end, CABINET, 0.8).add(9, end, CABINET, 0.8)
-    masks.add(8, masks.owner == 2, CHAIR, 0.7)
-    found = masks.agreed()
-    assert 9 not in check_whole(found) and at(found, end) == 7
-    masks.add(9, end, CHAIR, 0.8)
-    assert check_whole(masks.agreed())[9] == "chair", "no part of what has another name"
-
-
 def test_a_mask_that_runs_over_a_plane_is_dropped_with_the_reason() -> None:
     masks = Masks((CHAIR_AT, COUNTER))
     patch = (masks.owner == 0) & (np.abs(masks.vertices[:, :2] - [1.0, -0.8]) < 0.4).all(axis=1)
@@ -182,7 +172,7 @@ def test_a_door_is_kept_where_most_looks_had_it(score: float) -> None:
         assert found.dropped == (f"a window, door or curtain that masks had in few looks: {score:.2f}",)
         assert check_whole(found)[at(found, where)] == "wall"
     else:
-        assert check_whole(found)[9] == "door" and found.reasons[9].shape == UNHEARD
+        assert check_whole(found)[9] == "door" and found.reasons[9].shape == BY_MOST_LOOKS
 
 
 def test_a_name_that_its_size_speaks_against_goes_and_the_thing_stays() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.class_counts import class_counts
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.fuse.names import (
     BACKGROUND,
@@ -17,6 +18,7 @@ from scenewright.stages.fuse.names import (
     Rates,
     Said,
     name_of,
+    prior_odds,
     rates_of,
     said_of,
 )
@@ -129,3 +131,27 @@ def test_rates_are_those_of_the_log_within_least_shares() -> None:
     assert rates_of([], things) == Rates(0.5, WRONG, BACKGROUND)
     assert rates_of([Said(9, {CHAIR: 1.0})], things).right == 1 - SILENT, "masks without errors"
     assert rates_of([Said(9, {CHAIR: 0.01})], things).right == SELDOM
+
+
+def test_a_mask_of_a_wall_is_silent_about_a_thing() -> None:
+    assert named({CHAIR: 0.4, WALL: 0.5}) == named({CHAIR: 0.4})
+
+
+def test_the_prior_is_the_share_of_annotated_things_and_the_range_of_sizes() -> None:
+    counts = class_counts()
+    chairs = counts.of("chair") / counts.nameless
+    assert prior_odds("chair") == pytest.approx(chairs * np.log(4 / 0.05) / np.log(1.8 / 0.3))
+    assert prior_odds("desk") == pytest.approx(counts.of("desk") / counts.nameless), "no range is known"
+    assert prior_odds("a class of one's own") == pytest.approx(counts.rare / counts.nameless)
+    assert set(counts.counts) <= {entry.name for entry in VOCABULARY.classes}
+
+
+def test_what_is_common_is_believed_on_one_good_look_and_what_is_rare_is_not() -> None:
+    rates = Rates(0.5, WRONG, BACKGROUND)
+    assert named({CHAIR: 0.5}, 1.0, rates=rates).class_id == CHAIR
+    assert named({class_id("person"): 0.5}, 1.0, rates=rates).class_id == OBJECT
+
+
+def test_no_name_comes_from_the_prior_alone() -> None:
+    hardly = named({CHAIR: 0.01}, rates=Rates(SELDOM, WRONG, BACKGROUND))
+    assert hardly.class_id == OBJECT and prior_odds("chair") > 1

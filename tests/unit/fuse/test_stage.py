@@ -17,10 +17,10 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.segments import FrameSegments, Segments
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
-from scenewright.stages.fuse.agreement import BOUND, BY_MASKS, PIECE
 from scenewright.stages.fuse.inputs import check_origin
 from scenewright.stages.fuse.parameters import STAGE, FuseParameters
 from scenewright.stages.fuse.stage import run
+from scenewright.stages.fuse.testimony import BOUND, BY_MASKS, PIECE
 from scenewright.stages.kit.formats.masks import write_panoptic_zip
 from scenewright.stages.kit.formats.ply_files import read_ply
 from scenewright.stages.kit.formats.trajectories import write_tum
