@@ -17,7 +17,7 @@ from scenewright.stages.kit.tasks.strips import Schema
 from scenewright.stages.plan.believed_tree import TreeState
 from scenewright.stages.plan.checks import GoalInRoom
 from scenewright.stages.plan.pick_place import Budgets, GraspStyle
-from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 
 class Execution(Protocol):
@@ -106,7 +106,6 @@ class PlanAction:
     ) -> RobotState:
         """Bring the model to what it is after a manipulation, and return the robot's state."""
         state = RobotState(manipulation.base, manipulation.segments[-1].path[-1, 3:])
-        hold_for_checks(model, state)
         self.move_things(model, arguments, manipulation)
         for joint, value in manipulation.joint_values.items():
             model.move_joint(joint, value)

@@ -24,7 +24,7 @@ from scenewright.stages.plan.eyes import Eyes, Room
 from scenewright.stages.plan.level_carrying import LEVEL_PACE, levelled
 from scenewright.stages.plan.pick_place import Budgets
 from scenewright.stages.plan.refinement import DRIVE, Step, grasp_style, put_there_later, refine_action
-from scenewright.stages.plan.world_model import RobotState, Snapshot, WorldModel, hold_for_checks
+from scenewright.stages.plan.world_model import RobotState, Snapshot, WorldModel, as_held
 
 NOT_THERE = "not_found"
 """Failure of an action on what the room does not have: neither another attempt nor another plan helps."""
@@ -191,7 +191,6 @@ class Conduct:
             arrived = replace(state, base=drive.segments[-1].path[-1, :3])
             self.model.restore(before)
             arrived = self._perceive(arrived)
-            hold_for_checks(self.model, arrived)
             preferred = self._look_again(step, self._anchor(step))
             if preferred is not None:
                 preferred = (arrived.base, preferred[1])
@@ -259,7 +258,6 @@ class Conduct:
     def look_around(self) -> None:
         """Take over everything that moves or has joints and has a counterpart in the room; of what is held its pose.
         What stands on that is a body of its own afterwards."""
-        self.model.checker.put_down()
         self.model.set_down()
         for body, match in sorted(self.matches.items()):
             record = self.model.records.get(body)
@@ -334,14 +332,12 @@ class Conduct:
         """Correct what the robot believes of itself and of what it holds by what the joints and a look say."""
         base, arm = state.base, state.arm
         if self.physical.held is None:
-            self.model.checker.put_down()
             self.model.set_down()
             return RobotState(base, arm)
         tool_from_item = self.physical.held_pose()
         if state.holding is not None:
             tool_from_item = tool_from_item @ self.seen_frames.get(state.holding, np.eye(4))
             self._take_along(state.holding)
-            self.model.checker.carry(state.holding, tool_from_item)
         return RobotState(base, arm, state.holding, tool_from_item, inverse(tool_from_item))
 
     def level(self, state: RobotState) -> RobotState:
@@ -353,7 +349,7 @@ class Conduct:
             return state
         model = self.model
         world_from_tool = base_pose(state.base, model.description) @ forward(model.chain, state.arm)
-        planner = ArmPlanner(model, self.random, self.budgets.path_samples)
+        planner = ArmPlanner(model, self.random, self.budgets.path_samples).under(as_held(model, state))
         goal = levelled(world_from_tool, state.tool_from_item)
         path = planner.line(state.base, state.arm, goal, Tally())
         if path is None:
@@ -364,7 +360,6 @@ class Conduct:
     def _take_along(self, item: str) -> None:
         """Join what is held with what stands on it, as they are in the room now: the load counts in collision checks.
         What has fallen off stands on something else from now on."""
-        self.model.checker.put_down()
         self.model.set_down()
         load = self.model.load(item)
         planned = {match.matched: body for body, match in self.matches.items() if match.matched is not None}

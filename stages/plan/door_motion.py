@@ -22,7 +22,7 @@ from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.segments import Manipulation
 from scenewright.stages.plan.action import MotionRequest
 from scenewright.stages.plan.pick_place import Budgets
-from scenewright.stages.plan.world_model import RobotState, WorldModel
+from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
 
 OVERSHOOT = 0.02
 """A door is pushed this much beyond shut [rad]; its limit stops it."""
@@ -94,13 +94,13 @@ def _candidate_bases(search: JointSearch, points: np.ndarray) -> np.ndarray:
     planner_reach = 0.98 * ArmPlanner(model, random, 1).reach
     middle, ring = points.mean(axis=0), {"nearest": 0.2, "farthest": 0.9, "heading": 1.2}
     bases = possible_bases(model.description, state.base, middle, model.room, budgets.bases, random, **ring)
-    rows = []
+    checker, rows = model.checker.under(as_held(model, state)), []
     for base in bases:
         poses = np.tile(np.eye(4), (len(points), 1, 1))
         poses[:, :3, 3] = points
         if max(shoulder_distance(base, pose, model.description, model.chain) for pose in poses) > planner_reach:
             continue
-        collision = model.checker.check(np.concatenate([base, state.arm]))
+        collision = checker.check(np.concatenate([base, state.arm]))
         if collision is None:
             rows.append(base)
             if len(rows) >= budgets.bases // 8:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -65,42 +66,38 @@ def level_place(
     folds then as after every place. `rest`: links that the load may touch, with depths [m].
     """
     assert state.tool_from_item is not None
-    checker = model.checker
-    touch = model.links(item)
+    in_hand = planner.under(carrying(item, state.tool_from_item, model.links(item)))
+    onto = planner.under(carrying(item, state.tool_from_item, model.links(item), rest))
+    # The load may have come nearer to the hand than a search likes; going straight up leaves it beside.
+    leaving = planner.under(touching(model.world.bodies[item].links))
     held_pose = base_pose(base, model.description) @ forward(model.chain, state.arm) @ state.tool_from_item
     yaw = float(np.arctan2(held_pose[1, 0], held_pose[0, 0]))
     for turn in (0.0, 0.4, -0.4):
-        checker.carry(item, state.tool_from_item)
-        checker.allow(touch=touch)
         upright = transform_from_yaw(yaw + turn, placement.world_from_item[:3, 3])
         world_from_tool = upright @ inverse(state.tool_from_item)
         if planner.reachable(base, world_from_tool, tally, starts=2) is None:
             continue
         above = world_from_tool.copy()
         above[2, 3] += RAISE
-        over = planner.line(base, state.arm, above, tally)
+        over = in_hand.line(base, state.arm, above, tally)
         if over is None:
             continue
-        checker.allow(touch=touch, rest_on=rest)
-        down = planner.line(base, over[-1], world_from_tool, tally)
+        down = onto.line(base, over[-1], world_from_tool, tally)
         if down is None:
             continue
-        checker.put_down(upright)
         opening = model.description.opening
         model.robot.set(Configuration(base, down[-1], opening))
-        # The load may have come nearer to the hand than a search likes; going straight up leaves it beside.
-        checker.allow(touch=tuple(model.world.bodies[item].links))
-        back = world_from_tool.copy()
-        back[:3, 3] -= RETREAT * back[:3, 2]
-        away = planner.line(base, down[-1], back, tally)
-        if away is None:
-            continue
-        checker.allow()
-        try:
-            home = planner.path(base, away[-1], model.description.carry)
-        except MotionFailed as failed:
-            tally.failed(failed)
-            continue
+        with model.world.posed(item, upright):
+            back = world_from_tool.copy()
+            back[:3, 3] -= RETREAT * back[:3, 2]
+            away = leaving.line(base, down[-1], back, tally)
+            if away is None:
+                continue
+            try:
+                home = planner.path(base, away[-1], model.description.carry)
+            except MotionFailed as failed:
+                tally.failed(failed)
+                continue
         return Manipulation(
             base,
             (

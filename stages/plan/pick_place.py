@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.base_placement import free_bases, possible_bases
@@ -19,7 +20,7 @@ from scenewright.stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, 
 from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements
 from scenewright.stages.plan.rim_grasps import rim_grasps
 from scenewright.stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
-from scenewright.stages.plan.world_model import RobotState, WorldModel
+from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
 
 APPROACH = 0.10
 """How far the tool comes along its axis, and over its place a thing arrives [m]; by eye."""
@@ -32,6 +33,10 @@ SLOW = 0.35
 FRICTION_USED = 0.3
 """Half of the friction **assumed** of rubber on household things: grasps that ask for no more are tried first, as what
 is held is carried with starts and stops."""
+LOW_LIFT, BACK_OUT = 0.012, (0.25, 0.15)
+"""How far a thing is lifted where there is no room for more, and how far it then goes back out [m]; by eye."""
+STEEP = 1.2
+"""A hand that came so steeply goes back up, not out [rad]."""
 PALM_BEHIND, HAND_END = 0.04, 0.11
 """How far behind the tool point the palm begins and the hand ends [m]."""
 PALM_ROOM = 0.006
@@ -152,7 +157,8 @@ def _bases_around(
     if fixed is not None:
         return fixed[None]
     bases = possible_bases(model.description, state.base, target, model.room, budgets.bases, random)
-    return free_bases(bases, state.arm, model.checker, tally.blockers, budgets.bases // 4)
+    checker = model.checker.under(as_held(model, state))
+    return free_bases(bases, state.arm, checker, tally.blockers, budgets.bases // 4)
 
 
 def plan_pick(
@@ -197,7 +203,6 @@ def plan_pick(
             {"width": width, "opening": model.description.opening, "size_uncertainty": budgets.size_uncertainty},
         )
     tally = Tally()
-    checker = model.checker
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
     bases = _bases_around(model, state, world_from_item[:3, 3], budgets, random, tally, base)
     queue = [
@@ -216,15 +221,10 @@ def plan_pick(
     queue.sort(key=lambda entry: (not over[id(entry[1])], sideways and entry[1].pitch > max(PITCHES["level"])))
     if preferred is not None:
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
-    checker.allow(touch=model.links(item))
-    try:
-        attempts = (_try_pick(model, state, item, source, at, grasp, arm_planner, tally) for at, grasp in queue)
-        motion = _first_motion(attempts, budgets.paths)
-        if motion is not None:
-            return motion
-    finally:
-        checker.put_down(world_from_item)
-        checker.allow()
+    attempts = (_try_pick(model, state, item, source, at, grasp, arm_planner, tally) for at, grasp in queue)
+    motion = _first_motion(attempts, budgets.paths)
+    if motion is not None:
+        return motion
     tally.raise_for(f"pick({item}, {source})", (item, source))
     raise AssertionError("unreachable")
 
@@ -254,66 +254,41 @@ def _try_pick(
     """Return the motion, None when a cheap test fails, or the failure of a path search (they are counted)."""
     world_from_item = model.pose(item)
     world_from_tool = world_from_item @ grasp.body_from_tool
-    checker = model.checker
     opening = model.description.opening
     model.robot.set(_opened_configuration(state, opening))
-    checker.allow(touch=model.links(item))
+    at_item = arm_planner.under(touching(model.links(item)))
     arm = arm_planner.reachable(base, world_from_tool, tally)
-    if arm is None or not arm_planner.free(base, arm, tally):
+    if arm is None or not at_item.free(base, arm, tally):
         return None
-    approach = arm_planner.line(base, arm, _retreat(world_from_tool, APPROACH), tally)
+    approach = at_item.line(base, arm, _retreat(world_from_tool, APPROACH), tally)
     if approach is None:
         return None
     approach = approach[::-1]
     # With the item in hand: up a little, then back out the way the hand came, or further up.
     tool_from_item = inverse(world_from_tool) @ world_from_item
     # What overlaps the item where it is believed to be is an error of belief: it may overlap as much on the way out.
-    within = {link: depth + 0.003 for link, depth in checker.overlaps(item).items()}
+    within = {link: depth + 0.003 for link, depth in model.checker.overlaps(item).items()}
     allowed_depths = {link: RESTING_DEPTH for link in (*model.links(source), *_supports(model, item))}
     allowed_depths = {link: max(within.get(link, 0.0), depth) for link, depth in allowed_depths.items()} | {
         link: depth for link, depth in within.items() if link not in allowed_depths
     }
-    lifted = None
     laden = model.laden(item)
-    checker.carry(item, tool_from_item)
-    checker.allow(touch=model.links(item), rest_on=allowed_depths)
+    off, out, in_hand = (
+        arm_planner.under(carrying(item, tool_from_item, model.links(item), depths))
+        for depths in (allowed_depths, within, {})
+    )
+    lifted = _lifted(model, base, arm, world_from_tool, grasp.pitch > STEEP, off, out, tally)
+    if lifted is None:
+        return None
+    folded = lifted[-1] if laden else in_hand.folded(base, lifted[-1], tally)
+    if folded is None:
+        return None
     try:
-        for lift in (RAISE,) if laden else (LIFT, 0.012):
-            up = arm_planner.line(base, arm, _shifted_pose(world_from_tool, np.array([0, 0, lift])), tally)
-            if up is None:
-                continue
-            checker.allow(touch=model.links(item), rest_on=within)
-            if laden:
-                lifted = np.concatenate([up, drawn_in(model, arm_planner, base, up[-1], tally)[1:]])
-                break
-            steep = grasp.pitch > 1.2
-            for distance in (0.25, 0.15):
-                goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
-                flat = goal[:3, 2] * np.array([1, 1, 0])
-                shift = np.array([0, 0, distance]) if steep else -flat / max(np.linalg.norm(flat), 1e-6) * distance
-                back = arm_planner.line(base, up[-1], _shifted_pose(goal, shift), tally)
-                if back is not None:
-                    lifted = np.concatenate([up, back[1:]])
-                    break
-            if lifted is not None:
-                break
-            checker.allow(touch=model.links(item), rest_on=allowed_depths)
-        if lifted is None:
-            return None
-        checker.allow(touch=model.links(item))
-        folded = lifted[-1] if laden else arm_planner.folded(base, lifted[-1], tally)
-        if folded is None:
-            return None
-        try:
-            home = lifted[-1:] if laden else arm_planner.path(base, lifted[-1], folded)
-        except MotionFailed as failed:
-            tally.failed(failed)
-            return failed
-    finally:
-        checker.put_down(world_from_item)
-        checker.allow(touch=model.links(item))
+        home = lifted[-1:] if laden else in_hand.path(base, lifted[-1], folded)
+    except MotionFailed as failed:
+        tally.failed(failed)
+        return failed
     model.robot.set(_opened_configuration(state, opening))
-    checker.allow()
     try:
         reach = arm_planner.path(base, state.arm, approach[0])
     except MotionFailed as failed:
@@ -330,6 +305,36 @@ def _try_pick(
         tool_from_item=tool_from_item,
         body_from_tool=grasp.body_from_tool,
     )
+
+
+def _lifted(
+    model: WorldModel,
+    base: np.ndarray,
+    arm: np.ndarray,
+    world_from_tool: np.ndarray,
+    steep: bool,
+    off: ArmPlanner,
+    out: ArmPlanner,
+    tally: Tally,
+) -> np.ndarray | None:
+    """Return arm values (K, J) up `off` what a thing in the hand stands on, and `out` the way the hand came, or further
+    up where it came `steep`; a laden one is drawn in level. None where nothing is free."""
+    item = out.checker.query.carried
+    laden = item is not None and model.laden(item)
+    for lift in (RAISE,) if laden else (LIFT, LOW_LIFT):
+        goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
+        up = off.line(base, arm, goal, tally)
+        if up is None:
+            continue
+        if laden:
+            return np.concatenate([up, drawn_in(model, out, base, up[-1], tally)[1:]])
+        for distance in BACK_OUT:
+            flat = goal[:3, 2] * np.array([1, 1, 0])
+            shift = np.array([0, 0, distance]) if steep else -flat / max(np.linalg.norm(flat), 1e-6) * distance
+            back = out.line(base, up[-1], _shifted_pose(goal, shift), tally)
+            if back is not None:
+                return np.concatenate([up, back[1:]])
+    return None
 
 
 def _opened_configuration(state: RobotState, opening: float) -> Configuration:
@@ -376,12 +381,10 @@ def plan_place(
         places, serves = _liftable_places(model, item, target, door, budgets, random, places, preferred, further)
     tally = Tally()
     arm_planner = ArmPlanner(model, random, budgets.path_samples)
-    checker = model.checker
     queue: list[tuple[np.ndarray, Placement]] = []
     wish = [] if preferred is None else [(preferred[0], Placement(preferred[1], *_cover(places, preferred[1])))]
     model.robot.set(_opened_configuration(state, model.description.opening))
-    checker.carry(item, state.tool_from_item)
-    checker.allow(touch=model.links(item))
+    checker = model.checker.under(carrying(item, state.tool_from_item, model.links(item)))
     for placement in places[: max(4, budgets.bases // 6)]:
         goal = placement.world_from_item[:3, 3]
         if base is None:
@@ -391,16 +394,10 @@ def plan_place(
             bases = base[None]
         queue += [(at, placement) for at in bases]
     queue = wish + queue[: budgets.pairs] if serves else queue[: budgets.pairs] + wish
-    try:
-        attempts = (
-            _try_place(model, state, item, target, at, placement, arm_planner, tally) for at, placement in queue
-        )
-        motion = _first_motion(attempts, budgets.paths)
-        if motion is not None:
-            return motion
-    finally:
-        checker.carry(item, state.tool_from_item)
-        checker.allow()
+    attempts = (_try_place(model, state, item, target, at, placement, arm_planner, tally) for at, placement in queue)
+    motion = _first_motion(attempts, budgets.paths)
+    if motion is not None:
+        return motion
     tally.raise_for(f"place({item}, {target})", (item, target))
     raise AssertionError("unreachable")
 
@@ -457,15 +454,14 @@ def _try_place(
     if model.laden(item):
         rest_on = {link: RESTING_DEPTH for link in model.links(target)}
         return level_place(model, state, item, base, placement, rest_on, arm_planner, tally)
-    checker = model.checker
     item_from_tool = inverse(state.tool_from_item)
     model.robot.set(_opened_configuration(state, model.description.opening))
-    checker.carry(item, state.tool_from_item)
     item_pose = placement.world_from_item
     # a foot that is let down on a tray's rim tips over
     depth = 0.0 if model.records[target].carriable else RESTING_DEPTH
-    touch, allowed_depths = model.links(item), dict.fromkeys(model.links(target), depth)
-    checker.allow(touch=touch, rest_on=allowed_depths)
+    links, depths = model.links(item), dict.fromkeys(model.links(target), depth)
+    onto = arm_planner.under(carrying(item, state.tool_from_item, links, depths))
+    in_hand = arm_planner.under(carrying(item, state.tool_from_item, links))
     # The yaw in which the hand points away from the base is the one an arm likes; the sampled yaw varies it.
     outward = np.arctan2(*(item_pose[:2, 3] - base[:2])[::-1])
     upright_from_item = model.standing(item)
@@ -476,46 +472,38 @@ def _try_place(
         upright = transform_from_yaw(yaw + wish, item_pose[:3, 3]) @ upright_from_item
         world_from_tool = upright @ item_from_tool
         arm = arm_planner.reachable(base, world_from_tool, tally)
-        if arm is None or not arm_planner.free(base, arm, tally):
+        if arm is None or not onto.free(base, arm, tally):
             continue
         height = LIFT if placement.covered else DRAWER_LIFT if placement.in_drawer else APPROACH
         above = _shifted_pose(world_from_tool, np.array([0, 0, height]))
-        down = arm_planner.line(base, arm, above, tally)
+        down = onto.line(base, arm, above, tally)
         if down is None:
             continue
-        checker.allow(touch=touch)
         if placement.covered:
             flat = above[:3, 2] * np.array([1, 1, 0])
-            out = arm_planner.line(base, down[-1], _shifted_pose(above, -0.25 * flat), tally)
+            out = in_hand.line(base, down[-1], _shifted_pose(above, -BACK_OUT[0] * flat), tally)
             if out is None:
-                checker.allow(touch=touch, rest_on=allowed_depths)
                 continue
             down = np.concatenate([down, out[1:]])
         break
     else:
         return None
     try:
-        reach = arm_planner.path(base, state.arm, down[-1])
+        reach = in_hand.path(base, state.arm, down[-1])
     except MotionFailed as failed:
         tally.failed(failed)
         return failed
-    checker.put_down(upright)
-    try:
-        opening = model.description.opening
+    opening = model.description.opening
+    with model.world.posed(item, upright):
         model.robot.set(_opened_configuration(state, opening))
-        checker.allow(touch=touch)
-        away_pose = _retreat(world_from_tool, APPROACH + 0.02)
-        away = arm_planner.line(base, arm, away_pose, tally)
+        away = arm_planner.under(touching(links)).line(base, arm, _retreat(world_from_tool, APPROACH + 0.02), tally)
         if away is None:
             return None
-        checker.allow()
         try:
             home = arm_planner.path(base, away[-1], model.description.carry)
         except MotionFailed as failed:
             tally.failed(failed)
             return failed
-    finally:
-        checker.carry(item, state.tool_from_item)
     return Manipulation(
         base,
         (

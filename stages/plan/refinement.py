@@ -17,7 +17,7 @@ from scenewright.stages.plan.domain import DOMAIN, START
 from scenewright.stages.plan.driving import drive_way
 from scenewright.stages.plan.learning import Lessons
 from scenewright.stages.plan.pick_place import Budgets, GraspStyle
-from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 TASK_STATES = (6000, 50_000)
 """Most states of one task search, and of one for a shortest plan: tasks of rooms take some hundreds."""
@@ -120,7 +120,6 @@ def _refine_from_bases(
     steps: list[Step] = []
     action.begin(model, arguments)
     for manipulation in action.manipulate(model, state, request):
-        hold_for_checks(model, state)
         try:
             path = drive_way(model, state, manipulation.base, request.random, request.budgets.path_samples)
         except MotionFailed as failed:
@@ -176,7 +175,6 @@ def refine_plan(
             origin = kind.target(arguments)
     finally:
         model.restore(snapshot)
-        hold_for_checks(model, RobotState(state.base, state.arm))
     return steps
 
 

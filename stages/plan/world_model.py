@@ -12,6 +12,7 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.interactive_scene import SceneBody
 from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.kit.acting.query import NOTHING, CollisionQuery, carrying
 from scenewright.stages.kit.geometry.transforms import apply, inverse, quaternion_of, transform_from_quaternion
 from scenewright.stages.kit.motion.collision import CollisionChecker
 from scenewright.stages.kit.motion.doors import body_from_moved
@@ -208,8 +209,7 @@ class WorldModel:
         return Snapshot(poses, joints, dict(self.records), laden)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Put everything where it was, loads aboard of what carried them; the robot carries nothing afterwards."""
-        self.checker.put_down()
+        """Put everything where it was, loads aboard of what carried them."""
         self.set_down()
         for name, pose in snapshot.poses.items():
             self.world.set_pose(name, pose)
@@ -307,13 +307,11 @@ def moved_record(record: SceneBody, world_from_body: np.ndarray, joint_values: d
     )
 
 
-def hold_for_checks(model: WorldModel, state: RobotState) -> None:
-    """Make the checker carry what the robot holds (or nothing)."""
-    model.checker.allow(touch=model.links(state.holding) if state.holding else ())
-    if state.holding is not None and state.tool_from_item is not None:
-        model.checker.carry(state.holding, state.tool_from_item)
-    else:
-        model.checker.put_down()
+def as_held(model: WorldModel, state: RobotState) -> CollisionQuery:
+    """Return the query of a robot with what it holds, or nothing, in its hand."""
+    if state.holding is None or state.tool_from_item is None:
+        return NOTHING
+    return carrying(state.holding, state.tool_from_item, model.links(state.holding))
 
 
 def true_record(world: PhysicsWorld, name: str, record: SceneBody) -> SceneBody:

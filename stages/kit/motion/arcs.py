@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -97,35 +97,29 @@ def along_arc(
     start = planner.reachable(base, poses[0], tally)
     if start is None:
         return None
-    arms = _arc(model, planner, base, arc, poses, start, tally)
+    at_handle = planner.under(replace(planner.checker.query, may_touch=frozenset({joint.part})))
+    arms = _arc(model, at_handle, base, arc, poses, start, tally)
     if arms is None:
         return None
-    checker = model.checker
     pulling = opening > 0
     try:
         with model.world.joints_at(body, {joint.name: float(values[0])}):
-            checker.allow(touch=(joint.part,))
             standoff_pose = poses[0].copy()
             standoff_pose[:3, 3] -= STANDOFF * standoff_pose[:3, 2]
-            approach = planner.line(base, arms[0], standoff_pose, tally)
+            approach = at_handle.line(base, arms[0], standoff_pose, tally)
             if approach is None:
                 return None
-            checker.allow()
             reach = planner.path(base, arm, approach[-1])
         with model.world.joints_at(body, {joint.name: max(0.0, float(values[-1]))}):
-            checker.allow(touch=(joint.part,))
             far = poses[-1].copy()
             far[:3, 3] -= STANDOFF * far[:3, 2]
-            away = planner.line(base, arms[-1], far, tally)
+            away = at_handle.line(base, arms[-1], far, tally)
             if away is None:
                 return None
-            checker.allow()
             home = planner.path(base, away[-1], model.description.carry)
     except MotionFailed as failed:
         tally.failed(failed)
         return None
-    finally:
-        checker.allow()
     segments = [
         Segment(whole_body(base, reach), opening),
         Segment(whole_body(base, approach[::-1]), opening, SLOW, label="reach"),
@@ -160,18 +154,15 @@ def _arc(
         tally.unreachable += 1
         tally.nearest = min(tally.nearest, failed.failure.numbers["distance"])
         return None
-    checker = model.checker
-    checker.allow(touch=(joint.part,))
     collision: Collision | None = None
     with model.world.joints_at(body, {joint.name: float(values[0])}):
         for index, value in enumerate(values):
             model.world.set_joint(body, joint.name, max(0.0, float(value)))
             rows = densify(arms[max(0, index - 1) : index + 1], np.full(arms.shape[1], ARM_RESOLUTION))
             for row in rows[-2:]:
-                collision = collision or checker.check(np.concatenate([base, row]))
+                collision = collision or planner.checker.check(np.concatenate([base, row]))
             if collision is not None:
                 break
-    checker.allow()
     if collision is not None:
         tally.collided(collision)
         return None

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+from scenewright.stages.kit.acting.query import CollisionQuery
 from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
 from scenewright.stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from scenewright.stages.kit.motion.cartesian import follow, straight_poses
@@ -92,10 +94,17 @@ class ArmPlanner:
 
     def __init__(self, model: ArmModel, random: np.random.Generator, samples: int) -> None:
         self.model = model
+        self.checker = model.checker
         self.random = random
         self.samples = samples
         self.space = SearchSpace(model.chain.lower, model.chain.upper, np.full(len(model.chain.lower), ARM_RESOLUTION))
         self.reach = reach(model.chain)
+
+    def under(self, query: CollisionQuery) -> ArmPlanner:
+        """Return this planner with its checks made under a query; both draw from the same generator."""
+        bound = copy(self)
+        bound.checker = self.model.checker.under(query)
+        return bound
 
     def reachable(
         self, base: np.ndarray, world_from_tool: np.ndarray, tally: Tally, starts: int = 6
@@ -120,7 +129,7 @@ class ArmPlanner:
 
     def free(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> bool:
         """Whether a configuration is free; a collision is counted in the tally."""
-        collision = self.model.checker.check(np.concatenate([base, arm]))
+        collision = self._check(base, arm)
         if collision is not None:
             tally.collided(collision)
         return collision is None
@@ -149,12 +158,12 @@ class ArmPlanner:
         return path
 
     def _check(self, base: np.ndarray, arm: np.ndarray) -> Collision | None:
-        return self.model.checker.check(np.concatenate([base, arm]))
+        return self.checker.check(np.concatenate([base, arm]))
 
     def path(self, base: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
         """Return a free joint path (N, J). Raises MotionFailed as find_path does."""
         query = Query(np.concatenate([base, start]), np.arange(3, 3 + len(start)), start, goal[None], self.space)
-        return find_path(query, self.model.checker, self.random, samples=self.samples)
+        return find_path(query, self.checker, self.random, samples=self.samples)
 
     def folded(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (J,) with the tool drawn in over the pedestal; what is held stays upright."""

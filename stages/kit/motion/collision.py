@@ -5,11 +5,13 @@ Two checkers of one meaning: pybullet's on the meshes, and a compiled one that s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.kit.acting.query import NOTHING, CollisionQuery
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.compiled_arrays import RobotArrays, SceneArrays
 from scenewright.stages.kit.motion.compiled_check import FREE, find_collision
@@ -37,37 +39,66 @@ class Collision:
     """Penetration [m]; negative when only the clearance is missed."""
 
 
+@dataclass
+class _Shared:
+    """What a checker and its copies under queries share."""
+
+    clearance: float
+    checks: int = 0
+    carried: str | None = None
+    """The body that Bullet sees as carried."""
+
+
 class CollisionChecker:
     """Asks whether configurations (3 + J,) of base and arm are free.
 
-    `clearance` [m] is kept to everything, itself excepted. What may be touched is said by `allow`.
+    `clearance` [m] is kept to everything, itself excepted. `under` a query it says what is free with something in the
+    hand, or where something may be touched. No check moves what is believed of the scene.
     """
 
     def __init__(self, world: PhysicsWorld, robot: Robot, clearance: float = 0.004) -> None:
         self.world = world
         self.robot = robot
-        self.clearance = clearance
-        self.checks = 0
-        """Checks of the meshes so far."""
+        self.query = NOTHING
         self.compiled = CompiledModel(world, robot, clearance)
-        self.carried: str | None = None
-        self._tool_from_carried = np.eye(4)
-        self._touchable: frozenset[str] = frozenset()
-        self._rest_on: dict[str, float] = {}
+        self._shared = _Shared(clearance)
         self._touching = frozenset({robot.hand, *robot.fingers})
         for name in world.bodies:
             self.add_body(name)
         for index in (-1, *robot.links.values()):
             self._group(robot.body_id, index, _ROBOT, _SCENE | _ROBOT | _CARRIED)
 
+    def under(self, query: CollisionQuery) -> CollisionChecker:
+        """Return this checker as it answers under a query: the same world, robot and counts."""
+        bound = copy(self)
+        bound.query = query
+        return bound
+
+    @property
+    def clearance(self) -> float:
+        """What is kept to everything [m]."""
+        return self._shared.clearance
+
+    @property
+    def checks(self) -> int:
+        """Checks of the meshes so far."""
+        return self._shared.checks
+
     def _group(self, body_id: int, link: int, group: int, mask: int) -> None:
         engine.setCollisionFilterGroupMask(body_id, link, group, mask, physicsClientId=self.world.client)
+
+    def _group_body(self, name: str, group: int, mask: int) -> None:
+        body = self.world.bodies[name]
+        for index in body.links.values():
+            self._group(body.body_id, index, group, mask)
 
     def add_body(self, name: str) -> None:
         """Make a scene body an obstacle (those in the world at construction are). Floors do not stop the pedestal."""
         body = self.world.bodies[name]
+        self._group_body(name, _SCENE, _ROBOT | _CARRIED)
+        if self._shared.carried == name:
+            self._shared.carried = None
         for index in body.links.values():
-            self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
             if body.record.class_name == "floor":
                 engine.setCollisionFilterPair(
                     self.robot.body_id,
@@ -78,30 +109,16 @@ class CollisionChecker:
                     physicsClientId=self.world.client,
                 )
 
-    # --- what is carried, what may be touched -----------------------------------------------------------------
-
-    def carry(self, name: str, tool_from_body: np.ndarray) -> None:
-        """From now on the body moves with the tool: world_from_body = world_from_tool @ tool_from_body (4, 4)."""
-        self.put_down()
-        self.carried, self._tool_from_carried = name, tool_from_body
-        body = self.world.bodies[name]
-        for index in body.links.values():
-            self._group(body.body_id, index, _CARRIED, _SCENE | _ROBOT)
-
-    def put_down(self, world_from_body: np.ndarray | None = None) -> None:
-        """The carried body (if any) becomes an obstacle again, at a pose (4, 4) or where it is."""
-        if self.carried is None:
+    def _carry(self, name: str | None) -> None:
+        """Let Bullet see a body as carried, and what was carried before as an obstacle again."""
+        before = self._shared.carried
+        if name == before:
             return
-        if world_from_body is not None:
-            self.world.set_pose(self.carried, world_from_body)
-        body = self.world.bodies[self.carried]
-        for index in body.links.values():
-            self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
-        self.carried = None
-
-    def allow(self, touch: Iterable[str] = (), rest_on: Mapping[str, float] | None = None) -> None:
-        """Say which links (by name) hand and fingers may touch, and how deep [m] the carried body may be in which."""
-        self._touchable, self._rest_on = frozenset(touch), dict(rest_on or {})
+        if before is not None and before in self.world.bodies:
+            self._group_body(before, _SCENE, _ROBOT | _CARRIED)
+        if name is not None:
+            self._group_body(name, _CARRIED, _SCENE | _ROBOT)
+        self._shared.carried = name
 
     def overlaps(self, name: str) -> dict[str, float]:
         """Return the links that touch a scene body where it is now, with the deepest penetration [m] of each.
@@ -109,39 +126,38 @@ class CollisionChecker:
         The robot and scene bodies do not count; clearances up to that of the checker do.
         """
         body = self.world.bodies[name]
-        for index in body.links.values():
-            self._group(body.body_id, index, _CARRIED, _SCENE)
+        self._carry(None)
+        self._group_body(name, _CARRIED, _SCENE)
         engine.performCollisionDetection(physicsClientId=self.world.client)
         depths: dict[str, float] = {}
         for contact in self.world.contacts(body.body_id):
             if contact.other_body not in (body.body_id, self.robot.body_id) and contact.depth > -self.clearance:
                 other_link = self.world.link_name(contact.other_body, contact.other_link)
                 depths[other_link] = max(contact.depth, depths.get(other_link, -np.inf))
-        for index in body.links.values():
-            self._group(body.body_id, index, _SCENE, _ROBOT | _CARRIED)
+        self._group_body(name, _SCENE, _ROBOT | _CARRIED)
         return depths
 
     @contextmanager
     def keeping(self, clearance: float) -> Iterator[None]:
         """Keep another clearance [m] meanwhile."""
-        before, self.clearance = self.clearance, clearance
+        before, self._shared.clearance = self.clearance, clearance
         self.compiled.keep(clearance)
         try:
             yield
         finally:
-            self.clearance = before
+            self._shared.clearance = before
             self.compiled.keep(before)
 
     # --- queries ----------------------------------------------------------------------------------------------
 
     def arrays(self) -> tuple[RobotArrays, SceneArrays]:
-        """Return what the compiled checks read, as the world, the hand and the allowed touches are now."""
-        self.compiled.update(self.carried, self._tool_from_carried, self._touchable, self._rest_on)
+        """Return what the compiled checks read, as the world, the hand and the query are now."""
+        self.compiled.update(self.query)
         return self.compiled.arm, self.compiled.scene
 
     def other_name(self, index: int) -> str:
         """Return the scene link or robot link behind what a compiled check says the collision is with."""
-        return self.compiled.other_name(index, self.carried)
+        return self.compiled.other_name(index, self.query.carried)
 
     def check(self, body: np.ndarray) -> Collision | None:
         """Return the worst collision of a configuration (3 + J,), or None when it is free.
@@ -155,22 +171,22 @@ class CollisionChecker:
 
     def check_meshes(self, body: np.ndarray) -> Collision | None:
         """Return the worst collision of a configuration (3 + J,) by the meshes alone, or None when it is free."""
-        self.checks += 1
+        self._shared.checks += 1
         self.robot.set_body(body)
-        if self.carried is not None:
-            self.world.set_pose(self.carried, self.robot.tool_pose() @ self._tool_from_carried)
+        carried = self.query.carried
+        self._carry(carried)
+        if carried is None:
+            return self._worst_contact()
+        with self.world.posed(carried, self.robot.tool_pose() @ self.query.tool_from_carried):
+            return self._worst_contact()
+
+    def _worst_contact(self) -> Collision | None:
         engine.performCollisionDetection(physicsClientId=self.world.client)
-        worst: Collision | None = None
-        for contact in self.world.contacts(self.robot.body_id):
-            collision = self._of_robot(contact)
-            if collision is not None and (worst is None or collision.depth > worst.depth):
-                worst = collision
-        if self.carried is not None:
-            for contact in self.world.contacts(self.world.bodies[self.carried].body_id):
-                collision = self._of_carried(contact)
-                if collision is not None and (worst is None or collision.depth > worst.depth):
-                    worst = collision
-        return worst
+        collisions = [self._of_robot(contact) for contact in self.world.contacts(self.robot.body_id)]
+        if self.query.carried is not None:
+            carried = self.world.bodies[self.query.carried].body_id
+            collisions += [self._of_carried(contact) for contact in self.world.contacts(carried)]
+        return max((entry for entry in collisions if entry is not None), key=lambda entry: entry.depth, default=None)
 
     def _of_robot(self, contact: Contact) -> Collision | None:
         own_link = self.robot.link_names.get(contact.own_link, "anchor")
@@ -182,8 +198,9 @@ class CollisionChecker:
             return None
         other_link = self.world.link_name(contact.other_body, contact.other_link)
         if contact.own_link in self._touching:
-            carried = self.carried is not None and contact.other_body == self.world.bodies[self.carried].body_id
-            if carried or other_link in self._touchable:
+            name = self.query.carried
+            carried = name is not None and contact.other_body == self.world.bodies[name].body_id
+            if carried or other_link in self.query.may_touch:
                 return None
         return Collision(own_link, other_link, contact.depth)
 
@@ -193,9 +210,9 @@ class CollisionChecker:
         if contact.depth <= -self.clearance:
             return None
         other_link = self.world.link_name(contact.other_body, contact.other_link)
-        if contact.depth < self._rest_on.get(other_link, -np.inf):
+        if contact.depth < self.query.rests_on.get(other_link, -np.inf):
             return None
-        return Collision(self.carried or "", other_link, contact.depth)
+        return Collision(self.query.carried or "", other_link, contact.depth)
 
 
 def tool_from_body(world_from_tool: np.ndarray, world_from_body: np.ndarray) -> np.ndarray:

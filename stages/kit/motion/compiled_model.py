@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scenewright.stages.kit.acting.query import CollisionQuery
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
 from scenewright.stages.kit.motion.compiled_arrays import CHECK, RESTING, SKIP, RobotArrays, SceneArrays
 from scenewright.stages.kit.motion.compiled_check import link_frames
@@ -56,14 +57,9 @@ class CompiledModel:
         if self._bodies is not None:
             self.scene = self.scene._replace(distance=clearance + APART)
 
-    def update(
-        self,
-        carried: str | None,
-        tool_from_carried: np.ndarray,
-        touchable: frozenset[str],
-        rest_on: Mapping[str, float],
-    ) -> None:
-        """Take over what changed in the world, in the hand and in what may be touched."""
+    def update(self, query: CollisionQuery) -> None:
+        """Take over what changed in the world and in the query."""
+        carried, tool_from_carried = query.carried, query.tool_from_carried
         rebuilt = False
         bodies = list(self.world.bodies.values())
         # By the bodies themselves: pybullet gives the id of one that was taken out to the next.
@@ -79,9 +75,9 @@ class CompiledModel:
                     self._place(name, body_range)
                     self._seen_body[name] = changed
         self._revision_and_carried = (self.world.revision, carried)
-        rules = (carried, touchable, tuple(rest_on))
+        rules = (carried, query.may_touch, tuple(query.rests_on))
         if rebuilt or rules != self._rules:
-            self._allow(carried, touchable, rest_on)
+            self._allow(carried, query.may_touch, query.rests_on)
             self._rules = rules
         configuration = self.robot.configuration()
         state = (round(configuration.opening, 6), carried, tool_from_carried.tobytes() if carried else b"")

@@ -184,6 +184,18 @@ class PhysicsWorld:
             body_id, pose[:3, 3].tolist(), quaternion_of(pose).tolist(), physicsClientId=self.client
         )
 
+    @contextmanager
+    def posed(self, name: str, world_from_body: np.ndarray) -> Iterator[None]:
+        """Put a body at a pose (4, 4) for a while, and back to the very numbers of before."""
+        body_id = self.bodies[name].body_id
+        before = engine.getBasePositionAndOrientation(body_id, physicsClientId=self.client)
+        self.set_pose(name, world_from_body)
+        try:
+            yield
+        finally:
+            self._changed(name)
+            engine.resetBasePositionAndOrientation(body_id, *before, physicsClientId=self.client)
+
     def _changed(self, name: str) -> None:
         self.revision += 1
         self.revisions[name] = self.revision

@@ -13,7 +13,7 @@ from scenewright.stages.plan.believed_tree import TreeState
 from scenewright.stages.plan.carriers import HAND
 from scenewright.stages.plan.checks import GoalInRoom
 from scenewright.stages.plan.pick_place import plan_pick
-from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
+from scenewright.stages.plan.world_model import RobotState, WorldModel
 
 
 def check_held(goal: GoalInRoom) -> Check:
@@ -95,11 +95,9 @@ class Pick(PlanAction):
     ) -> RobotState:
         """The item is in the hand."""
         arm = manipulation.segments[-1].path[-1, 3:]
-        state = RobotState(
+        return RobotState(
             manipulation.base, arm, arguments[0], manipulation.tool_from_item, manipulation.body_from_tool
         )
-        hold_for_checks(model, state)
-        return state
 
     def predicted(self, tree: TreeState, arguments: tuple[str, ...], manipulation: Manipulation) -> TreeState:
         """The hand carries the item."""

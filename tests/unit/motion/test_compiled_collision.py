@@ -6,6 +6,7 @@ import numpy as np
 from scenewright.schemas.base import as_transform
 from scenewright.schemas.interactive_scene import SceneBody
 from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.motion.collision import CollisionChecker
 from scenewright.stages.kit.motion.compiled_check import FREE, HIT, find_collision
 from scenewright.stages.kit.motion.convex_distance import Hull, convex_distance
@@ -129,34 +130,30 @@ def test_free_means_free_for_the_meshes(checker: CollisionChecker) -> None:
 
 
 def test_free_means_free_while_carrying_and_with_a_door_elsewhere(checker: CollisionChecker) -> None:
-    home = checker.world.pose("bottle_7")
     joint = next(iter(checker.world.bodies["fridge_2"].joints))
     value = checker.world.joint_value("fridge_2", joint)
     before, _ = checker.arrays()
     held = np.eye(4)
     held[:3, 3] = [0.0, 0.0, 0.05]
     checker.world.set_joint("fridge_2", joint, 1.2)
-    checker.carry("bottle_7", held)
+    in_hand = checker.under(carrying("bottle_7", held))
     try:
-        after, _ = checker.arrays()
+        after, _ = in_hand.arrays()
         assert len(after.frame) > len(before.frame)
-        wrong, strict, free = _compare(checker, 300, 1)
+        wrong, strict, free = _compare(in_hand, 300, 1)
     finally:
-        checker.put_down(home)
         checker.world.set_joint("fridge_2", joint, value)
     assert (wrong, strict <= 2, free > 50) == (0, True, True)
     assert len(checker.arrays()[0].frame) == len(before.frame)
 
 
 def test_what_may_be_touched_is_not_in_the_way(checker: CollisionChecker) -> None:
-    checker.allow(touch=("bottle_7",))
-    _, scene = checker.arrays()  # compiles anew what was put down or opened since
+    _, scene = checker.under(touching(("bottle_7",))).arrays()  # compiles anew what was put down or opened since
     names = checker.compiled.groups
     hand = checker.compiled.parts.index(PANDA.hand_link)
     arm = checker.compiled.parts.index("panda_link4")
     bottle = names.index("bottle_7")
     assert scene.allowed[hand, bottle] != scene.allowed[arm, bottle]
-    checker.allow()
     _, scene = checker.arrays()
     assert scene.allowed[hand, bottle] == scene.allowed[arm, bottle]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.acting.query import carrying
 from scenewright.stages.kit.motion.base_placement import base_query, plan_drive, sample_bases
 from scenewright.stages.kit.motion.collision import Collision, CollisionChecker
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -166,13 +167,13 @@ def test_what_is_carried_collides_too(checker: CollisionChecker) -> None:
     home = checker.world.pose("bottle_7")
     low = np.eye(4)
     low[:3, 3] = [0.0, 0.0, 0.25]  # a bottle stuck out along the approach, down into the table
-    checker.carry("bottle_7", low)
-    try:
-        collision = checker.check(body)
-        assert collision is not None
-        assert (collision.part, collision.other) == ("bottle_7", "table_3")
-    finally:
-        checker.put_down(home)
+    collision = checker.under(carrying("bottle_7", low)).check(body)
+    assert collision is not None
+    assert (collision.part, collision.other) == ("bottle_7", "table_3")
+    resting = carrying("bottle_7", low, rests_on={"table_3": 1.0, "cup_5": 1.0})
+    assert checker.under(resting).check(body) is None
+    assert checker.check(body) is None, "the checker itself carries nothing"
+    np.testing.assert_array_equal(checker.world.pose("bottle_7"), home)
 
 
 def test_driving_around_the_furniture(checker: CollisionChecker) -> None:

@@ -21,7 +21,7 @@ from scenewright.stages.plan.goals import default_goals
 from scenewright.stages.plan.pick_place import Budgets, plan_pick
 from scenewright.stages.plan.refinement import SearchSettings, plan_and_refine, refine_action
 from scenewright.stages.plan.symbols import DOMAIN, parse_goal, symbolic_state, task_problem
-from scenewright.stages.plan.world_model import RobotState, WorldModel, hold_for_checks
+from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
 
 from tests.unit.simulation.handmade_scene import HandmadeBody, kitchen, write_scene
 
@@ -124,14 +124,13 @@ def test_every_motion_of_a_refined_plan_is_free_of_collision(
             end = segment.path[-1]
         segments = [segment for segment in step.segments if segment.pace > 0.5]
         for segment in segments:
-            hold_for_checks(model, held if segment.item == "bottle_7" else START)
+            checker = model.checker.under(as_held(model, held if segment.item == "bottle_7" else START))
             if segment.item != "bottle_7" and step.name == "place":
                 model.world.set_pose("bottle_7", attempt.steps[3].manipulation.item_pose)  # type: ignore[union-attr,arg-type]
             for row in densify(segment.path, resolution):
-                collision = model.checker.check(row)
+                collision = checker.check(row)
                 assert collision is None or collision.depth < 0.002, (step.text, collision)
                 checked += 1
-        model.checker.put_down()
     assert checked > 300
 
 
@@ -208,7 +207,6 @@ def test_a_robot_walled_in_cannot_drive(tmp_path: Path) -> None:
                 MotionRequest(("bottle_7", "fridge_2"), BUDGETS, np.random.default_rng(0)),
                 "start",
             )
-        assert model.checker.carried is None
     finally:
         model.close()
     failure = raised.value.failure

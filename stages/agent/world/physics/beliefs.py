@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.schemas.base import as_transform
 from scenewright.stages.agent.world.physics.fronts import Front
 from scenewright.stages.agent.world.physics.shapes import record_of, slab, urdf_of
+from scenewright.stages.kit.acting.query import NOTHING, CollisionQuery, carrying
 from scenewright.stages.kit.motion.collision import CollisionChecker
 from scenewright.stages.kit.motion.kinematics import arm_chain
 from scenewright.stages.kit.simulation.robot import Configuration, Robot
@@ -85,20 +86,19 @@ class Beliefs:
         """Return map_from_body (4, 4) of what is believed in."""
         return self.world.pose(name)
 
-    def hold(self, hold: Hold | None) -> None:
-        """Let checks carry the box of what is held."""
-        self.checker.put_down()
+    def hold(self, hold: Hold | None) -> CollisionQuery:
+        """Believe in the box of what is held, or in none; return the query of a hand that carries it."""
         if HELD in self._boxes:
             self.world.remove_body(HELD)
             del self._boxes[HELD]
         if hold is None:
-            return
+            return NOTHING
         half = hold.size / 2
         part = slab(tuple(-half), tuple(half))  # type: ignore[arg-type]
         self.world.add_body(record_of(HELD, "box", (0, 0, 0), 0), urdf_of(HELD, (part,), 1.0))
         self.checker.add_body(HELD)
         self._boxes[HELD] = tuple(half)
-        self.checker.carry(HELD, hold.tool_from_box)
+        return carrying(HELD, hold.tool_from_box, (HELD,))
 
 
 def _identity(entry: Believed) -> object:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scenewright.stages.agent.world.physics.beliefs import HELD, Beliefs, Box, Hold
+from scenewright.stages.agent.world.physics.beliefs import Beliefs, Box, Hold
 from scenewright.stages.agent.world.physics.eyes import Surface
 from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, STRAIGHT, antipodal_grasps, within_reach
+from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
@@ -120,7 +121,6 @@ def plan_grasp(
             continue
         finally:
             beliefs.hold(None)
-            beliefs.checker.allow()
         if motion is not None:
             return motion
     tally.raise_for(f"grasp({name})", (name,))
@@ -132,10 +132,7 @@ def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.ran
     that is in the map."""
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     carry, grasps = beliefs.description.carry, _grasps_of(target, base, beliefs.description.opening)[:CANDIDATES]
-    try:
-        return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
-    finally:
-        beliefs.checker.allow()
+    return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
 
 
 def _grasps_of(target: Target, base: np.ndarray, opening: float) -> list[np.ndarray]:
@@ -174,12 +171,11 @@ def _one_grasp(
 ) -> Motion | None:
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
-    checker, opening = beliefs.checker, beliefs.description.opening
+    opening = beliefs.description.opening
     approach_and_lift = _way_in(planner, base, arm, target, map_from_tool, tally)
     if approach_and_lift is None:
         return None
     approach, lift = approach_and_lift
-    checker.allow()
     reach = planner.path(base, arm, approach[-1])
     low, high = whole_box(target)
     box = np.eye(4)
@@ -192,12 +188,11 @@ def _one_grasp(
         beliefs.description.carry,
     )
     beliefs.world.set_pose(target.name, _far())
-    beliefs.hold(hold)
-    checker.allow(touch=(HELD,))
-    home = planner.folding(base, lift[-1], Tally())
+    in_hand = planner.under(beliefs.hold(hold))
+    home = in_hand.folding(base, lift[-1], Tally())
     if home is None:
-        folded = planner.folded(base, lift[-1], tally)
-        home = planner.path(base, lift[-1], hold.home if folded is None else folded)
+        folded = in_hand.folded(base, lift[-1], tally)
+        home = in_hand.path(base, lift[-1], hold.home if folded is None else folded)
     hold = replace(hold, home=home[-1])
     return Motion(
         (Segment(whole_body(base, reach), opening), Segment(whole_body(base, approach[::-1]), opening, SLOW)),
@@ -214,7 +209,7 @@ def _way_in(
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
     beliefs.robot.set(Configuration(base, arm, beliefs.description.opening))
-    beliefs.checker.allow(touch=(target.name,))
+    planner = planner.under(touching((target.name,)))
     at = planner.reachable(base, map_from_tool, tally, starts=3)
     if at is not None and not planner.free(base, at, tally):
         at = _by_another_elbow(planner, base, map_from_tool, tally) if target.behind > 0 else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.agent.world.physics.beliefs import HELD, Beliefs, Believed, Hold
@@ -60,10 +60,10 @@ def plan_release(
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     opening, carry = beliefs.description.opening, beliefs.description.carry
     foot = hold.foot if hold is not None else 0.0
-    beliefs.hold(hold)
+    held = beliefs.hold(hold)
     beliefs.robot.set(Configuration(base, arm, opening))
     beliefs.show(spot.beside)
-    beliefs.checker.allow((HELD,) if hold is not None else (), dict.fromkeys(spot.nestled, NESTLES))
+    planner = planner.under(replace(held, rests_on=dict.fromkeys(spot.nestled, NESTLES)))
     heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
     try:
         for turn, tilt in TURNS:
@@ -91,7 +91,6 @@ def plan_release(
         tally.raise_for("place", (HELD,))
     finally:
         beliefs.hold(None)
-        beliefs.checker.allow()
     raise AssertionError("unreachable")
 
 
