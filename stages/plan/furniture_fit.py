@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.stages.kit.geometry.cameras import project
+from scenewright.stages.kit.geometry.point_clouds import normals_of_neighbours
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.rendering.object_views import View
 from scenewright.stages.plan.pose_fit import FAR, KEPT, SURE
@@ -216,8 +217,7 @@ def _sides(surface_points: np.ndarray, eyes: np.ndarray, most: int) -> Surface:
     the nearest camera: of the plane through the points around."""
     points, cloud = _thin_out(surface_points, most), _thin_out(surface_points, AROUND_OF)
     around = cloud[cKDTree(cloud).query(points, k=min(AROUND, len(cloud)))[1]]
-    offset = around - around.mean(axis=1, keepdims=True)
-    normals: np.ndarray = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))[1][:, :, 0]
+    normals = normals_of_neighbours(around)
     rays = eyes[cKDTree(eyes).query(points)[1]] - points
     return points, normals * np.where(np.einsum("ij,ij->i", normals, rays) < 0, -1.0, 1.0)[:, None]
 

@@ -35,6 +35,14 @@ def vertex_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.bincount(faces.ravel(), weights=np.repeat(twice / 6, 3), minlength=len(vertices))
 
 
+def normals_of_neighbours(neighbours: np.ndarray) -> np.ndarray:
+    """Return unit normals (N, 3), of either sign, of the planes through each point's neighbours (N, K, 3): the direction
+    in which they vary least."""
+    centred = neighbours - neighbours.mean(axis=1, keepdims=True)
+    normals: np.ndarray = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred))[1][:, :, 0]
+    return normals
+
+
 def sample_large_triangles(
     vertices: np.ndarray, faces: np.ndarray, spacing: float, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from scenewright.stages.kit.compiled import compiled
+from scenewright.stages.kit.geometry.point_clouds import normals_of_neighbours
 from scenewright.stages.kit.rendering.splatting.gaussians import Gaussians
 from scipy.spatial import cKDTree
 
@@ -42,8 +43,7 @@ def pieces(gaussians: Gaussians) -> np.ndarray:
     tree = cKDTree(means)
     count = min(SMOOTH, len(solid) - 1)
     distances, neighbours = tree.query(means, count + 1)
-    around = means[neighbours] - means[neighbours].mean(axis=1, keepdims=True)
-    normals = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))[1][:, :, 0]
+    normals = normals_of_neighbours(means[neighbours])
     colors = np.median(colors[neighbours[:, :6]], axis=1)
     neighbour_count = min(NEIGHBOURS, count)
     first = np.repeat(np.arange(len(solid)), neighbour_count)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenewright.stages.kit.geometry import planes
+from scenewright.stages.kit.geometry.point_clouds import normals_of_neighbours
 
 
 def sheet(random, center, first, second, count, noise=0.0):
@@ -128,3 +129,13 @@ def test_rectangle_of_a_tilted_sheet():
     assert np.cross(corners[1] - corners[0], corners[2] - corners[1]) @ normal == pytest.approx(area, rel=1e-6)
     with pytest.raises(ValueError, match="inliers"):
         planes.plane_rectangle(np.zeros((0, 3)), normal)
+
+
+def test_neighbours_on_a_plane_give_its_normal() -> None:
+    random = np.random.default_rng(3)
+    normals = random.normal(size=(20, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offsets = random.normal(size=(20, 8, 3))
+    on_planes = offsets - np.einsum("nki,ni->nk", offsets, normals)[..., None] * normals[:, None]
+    found = normals_of_neighbours(on_planes + random.normal(size=(20, 1, 3)))
+    np.testing.assert_allclose(np.abs(np.einsum("ni,ni->n", found, normals)), 1.0, atol=1e-9)

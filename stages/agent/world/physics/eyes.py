@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.agent.world.physics.shapes import COLORS, STAIN
+from scenewright.stages.kit.geometry.point_clouds import normals_of_neighbours
 from scenewright.stages.kit.rendering.object_views import Picture, cloud
 from scipy.spatial import cKDTree
 
@@ -108,10 +109,7 @@ def _at_an_edge(mask: np.ndarray) -> bool:
 def outward(points: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """Return surface normals (N, 3) of points, from the plane of their neighbours, towards the camera."""
     count = min(NEIGHBOURS, len(points))
-    neighbours = points[cKDTree(points).query(points, k=count)[1]]
-    centred = neighbours - neighbours.mean(axis=1, keepdims=True)
-    _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred))
-    normals = vectors[:, :, 0]
+    normals = normals_of_neighbours(points[cKDTree(points).query(points, k=count)[1]])
     towards = np.einsum("ni,ni->n", normals, eye - points) < 0
     normals[towards] *= -1
     return normals
