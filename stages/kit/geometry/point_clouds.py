@@ -36,7 +36,7 @@ def vertex_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def normals_of_neighbours(neighbours: np.ndarray) -> np.ndarray:
-    """Return unit normals (N, 3), of either sign, of the planes through each point's neighbours (N, K, 3): the direction
+    """Return unit normals (N, 3), of either sign, of planes through neighbours (N, K, 3) of points: the direction
     in which they vary least."""
     centred = neighbours - neighbours.mean(axis=1, keepdims=True)
     normals: np.ndarray = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred))[1][:, :, 0]
