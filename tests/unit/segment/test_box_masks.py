@@ -1,4 +1,4 @@
-"""Boxes become masks of the thing and not of what is around it; floors and walls are found, furniture is no wall."""
+"""Boxes become masks of the thing and not of what is around it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,6 @@ from scenewright.stages.kit.geometry.transforms import look_at
 from scenewright.stages.segment.backends.detector.agreement import Thing
 from scenewright.stages.segment.backends.detector.backend import merge_duplicates, paint
 from scenewright.stages.segment.backends.detector.box_masks import FrameGeometry, box_mask, frame_geometry
-from scenewright.stages.segment.backends.detector.room import (
-    find_floor,
-    find_room,
-    find_walls,
-    room_masks,
-    sample_surface,
-)
 from scenewright.stages.segment.geometric import segment_depth
 
 from tests.unit.segment.scenes import combine
@@ -63,7 +56,7 @@ def box_around(mask: np.ndarray, margin: int = 2) -> np.ndarray:
 
 def geometry_of(frame, pose: np.ndarray, one_segment: bool = False) -> FrameGeometry:
     labels = (frame.points[..., 2] > 0).astype(np.int32) if one_segment else frame.labels
-    return frame_geometry(labels, frame.points, frame.normals, frame.points[..., 2] > 0, pose)
+    return frame_geometry(labels, frame.points, frame.normals, pose)
 
 
 def overlap(first: np.ndarray, second: np.ndarray) -> float:
@@ -74,7 +67,7 @@ def test_the_table_does_not_swallow_the_cup() -> None:
     """Even when no crease separates the two: cup and table are one geometric segment here."""
     frame, which, pose = see([0.2, -0.4, 1.3], [0.0, 0.55, 0.74])
     labels = np.where((which == 2) | (which == 3), 1, 0).astype(np.int32)
-    geometry = frame_geometry(labels, frame.points, frame.normals, frame.points[..., 2] > 0, pose)
+    geometry = frame_geometry(labels, frame.points, frame.normals, pose)
     cup = box_mask(box_around(which == 3, 5), geometry)
     assert overlap(cup, which == 3) > 0.7
     assert (cup & (which == 2)).sum() < 0.15 * cup.sum()
@@ -88,14 +81,7 @@ def test_own_segments_make_the_mask() -> None:
 
 def test_a_table_loses_what_stands_on_it_and_the_floor_below() -> None:
     frame, which, pose = see([0.3, -1.2, 1.5], [0.0, 0.5, 0.7])
-    masks = room_masks(
-        frame.points,
-        frame.normals,
-        pose,
-        find_room([sample_surface(frame.points, frame.normals, pose, step=2)], floor_is_zero=True),
-    )
-    available = (frame.points[..., 2] > 0) & ~masks["floor"]
-    geometry = frame_geometry(frame.labels, frame.points, frame.normals, available, pose)
+    geometry = frame_geometry(frame.labels, frame.points, frame.normals, pose)
     table = box_mask(box_around((which == 2) | (which == 3)), geometry, large_face=True, flat_topped=True)
     assert overlap(table, which == 2) > 0.8
     # The lowest 3 cm of the cup's 10 are within the clearance; the cup's own mask lies over them in the end.
@@ -116,63 +102,9 @@ def test_an_empty_or_outlying_box_gives_nothing() -> None:
     for box in ([10, 10, 10, 40], [400, 300, 500, 400], [-50, -50, -10, -10]):
         assert not box_mask(np.array(box, dtype=float), geometry).any()
     blind = frame_geometry(
-        np.zeros((120, 160), np.int32),
-        np.zeros((120, 160, 3), np.float32),
-        np.zeros((120, 160, 3), np.float32),
-        np.zeros((120, 160), bool),
-        None,
+        np.zeros((120, 160), np.int32), np.zeros((120, 160, 3), np.float32), np.zeros((120, 160, 3), np.float32), None
     )
     assert not box_mask(np.array([10, 10, 50, 50]), blind).any()
-
-
-def surface(views: list[tuple[list[float], list[float]]]) -> list:
-    samples = []
-    for eye, target in views:
-        frame, _, pose = see(eye, target)
-        samples.append(sample_surface(frame.points, frame.normals, pose, step=4))
-    return samples
-
-
-ROUND_TRIP = [
-    ([0.0, -1.5, 1.5], [0.0, 1.0, 0.9]),
-    ([0.0, -1.0, 1.5], [2.0, 1.0, 1.0]),
-    ([0.0, -1.0, 1.5], [-2.0, 1.0, 1.0]),
-    ([0.5, 0.0, 1.5], [2.0, -0.5, 1.0]),
-    ([-0.5, 0.0, 1.5], [-2.0, -0.5, 1.0]),
-]
-
-
-def test_floor_and_walls_of_a_room() -> None:
-    room = find_room(surface(ROUND_TRIP), floor_is_zero=True)
-    assert room.floor == pytest.approx(0.0, abs=0.01)
-    positions = sorted(
-        (int(np.argmax(np.abs(wall.normal))), round(-wall.offset * float(wall.normal.sum()), 1)) for wall in room.walls
-    )
-    assert positions == [(0, -2.0), (0, 2.0), (1, 2.0)], "three walls were looked at; unit and fridge are none"
-    for wall in room.walls:
-        assert wall.offset == pytest.approx(2.0, abs=0.02), "normals point into the room"
-
-
-def test_a_table_is_no_floor() -> None:
-    heights = np.concatenate([np.full(500, 0.74), np.full(100, 0.84)])
-    ups = np.ones_like(heights)
-    assert find_floor(heights, ups) == pytest.approx(0.74, abs=0.01)
-    samples = surface([([0.0, -0.2, 1.2], [0.0, 0.62, 0.74])])
-    assert find_room(samples, floor_is_zero=True).floor is None
-    assert find_room([], floor_is_zero=True).floor is None
-    few = np.zeros(10)
-    assert find_floor(few, few) is None and find_walls(np.zeros((0, 3)), np.zeros((0, 3)), 0.0) == ()
-
-
-def test_room_masks_are_floor_and_wall_pixels() -> None:
-    room = find_room(surface(ROUND_TRIP), floor_is_zero=True)
-    frame, which, pose = see(*ROUND_TRIP[0])
-    masks = room_masks(frame.points, frame.normals, pose, room)
-    height = (frame.points @ pose[:3, :3].T + pose[:3, 3])[..., 2]
-    floor = (which == 1) & (height < 0.03)
-    wall = (which == 1) & (height > 0.1)
-    assert overlap(masks["floor"], floor) > 0.85 and overlap(masks["wall"], wall) > 0.8
-    assert not (masks["wall"] & ((which == 4) | (which == 5))).sum() > 0.05 * masks["wall"].sum()
 
 
 def test_sizes_correct_the_detector() -> None:
@@ -202,13 +134,10 @@ def test_duplicates_are_merged_and_small_things_painted_on_top() -> None:
     unnamed = Thing(VOCABULARY.by_name("object"), 0.9, back)
     assert [item.semantic.name for item in merge_duplicates([unnamed, Thing(chair, 0.4, back)])] == ["chair"]
     small, large = rectangle(20, 20, 30, 30), rectangle(0, 0, 100, 100)
-    layout = {"floor": rectangle(50, 0, 120, 160)}
-    frame = paint(
-        layout, [Thing(cup, 0.4, small), Thing(table, 0.9, large)], {"floor": VOCABULARY.by_name("floor")}, (120, 160)
-    )
+    frame = paint([Thing(cup, 0.4, small), Thing(table, 0.9, large)], (120, 160))
     names = {VOCABULARY.by_id(mask.class_id).name: number for number, mask in frame.masks.items()}
     assert frame.ids[25, 25] == names["cup"] and frame.ids[5, 5] == names["table"]
-    assert frame.ids[60, 20] == names["table"] and frame.ids[110, 150] == names["floor"] and frame.ids[10, 150] == 0
+    assert frame.ids[60, 20] == names["table"] and frame.ids[110, 150] == 0
 
 
 def test_a_table_without_foreground_in_its_box_gives_no_mask() -> None:
@@ -217,6 +146,6 @@ def test_a_table_without_foreground_in_its_box_gives_no_mask() -> None:
     labels = np.ones((height, width), dtype=np.int32)
     points = np.dstack([*np.meshgrid(np.arange(width) * 0.01, np.arange(height) * 0.01), np.full((height, width), 2.0)])
     normals = np.tile([0.0, 0.0, -1.0], (height, width, 1))
-    geometry = frame_geometry(labels, points, normals, np.ones((height, width), dtype=bool), np.eye(4))
+    geometry = frame_geometry(labels, points, normals, np.eye(4))
     box = np.array([20.0, 10.0, 40.0, 30.0])
     assert not box_mask(box, geometry, flat_topped=True).any()

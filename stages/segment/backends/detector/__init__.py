@@ -1,4 +1,4 @@
-"""Backend `detector`: boxes of an object detector turned into masks by the depth; floor, walls, ceiling by geometry."""
+"""Backend `detector`: boxes of an object detector turned into masks by the depth."""
 
 from __future__ import annotations
 

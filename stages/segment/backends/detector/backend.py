@@ -1,25 +1,20 @@
-"""Backend `detector`: boxes of an object detector turned into masks by the depth; floor, walls, ceiling by geometry."""
+"""Backend `detector`: boxes of an object detector turned into masks by the depth."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from scenewright.schemas.errors import MissingDependency
-from scenewright.schemas.sequence import SequenceFile
-from scenewright.schemas.vocabulary import UNNAMED, SemanticClass, Vocabulary, load_vocabulary
+from scenewright.schemas.vocabulary import UNNAMED, Vocabulary, load_vocabulary
 from scenewright.stages.kit.class_extents import extent_of, is_plausible
-from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.formats.frames import Frame
 from scenewright.stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
 from scenewright.stages.segment.backends.detector.box_masks import box_mask, frame_geometry
-from scenewright.stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
 from scenewright.stages.segment.backends.detector.yolox import Detections, Detector
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.coco import COCO_NAMES
-from scenewright.stages.segment.geometric import GeometricFrame, GeometricSettings, pixels_at, segment_depth
+from scenewright.stages.segment.geometric import GeometricFrame, pixels_at
 from scenewright.stages.segment.networks.semantic import SemanticSegmenter, open_segmenter
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
-from scenewright.stages.segment.settings import geometric_settings
 
 LARGE_FACED = frozenset({"table", "desk", "bed", "sofa", "bench", "monitor", "fridge"})
 """Classes of which a box around a part is still a detection of the whole: one face fills most of the box."""
@@ -28,30 +23,22 @@ FLAT_TOPPED = frozenset({"table", "desk"})
 LARGEST_UNNAMED = 0.8
 """A detection of impossible size still points at some item when that is small; at furniture size it says nothing, and
 its votes would drown those of the frames in which the thing was recognised [m]."""
-SAMPLED_FRAMES = 25
-"""Frames, spread over the log, of whose surface the room is made; by eye."""
 DUPLICATE_OVERLAP = 0.5
 """Two masks of one class that share this much of the smaller one are the same thing."""
 
 
 class DetectorBackend:
-    """Detector boxes combined with geometric segments.
-
-    Looks at a few frames of the whole sequence first, to find floor, walls and ceiling.
-    """
+    """Detector boxes combined with geometric segments. What bounds the room is for `fuse` to find."""
 
     name = "detector"
     streams: tuple[str, ...] = ("color", "depth")
 
     def __init__(
         self,
-        sequence: SequenceFile,
-        reader: FrameReader,
         vocabulary: Vocabulary,
         detector: Detector,
         *,
         label: str,
-        geometric: GeometricSettings,
         minimum_pixels: int,
         witness: SemanticSegmenter | None = None,
         threshold: float = 0.0,
@@ -70,27 +57,15 @@ class DetectorBackend:
         self._detector = detector
         self._classes = [vocabulary.by_alias(name, "coco") for name in COCO_NAMES]
         self._anything = vocabulary.by_name(UNNAMED)
-        self._layout = {name: vocabulary.by_name(name) for name in ("floor", "wall", "ceiling")}
-        self.room: Room = find_room(
-            _surface_samples(reader, geometric), floor_is_zero=sequence.gravity.method in ("given", "floor_plane")
-        )
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
-        """Return the masks of a frame; one without colour has layout masks alone."""
-        layout = {}
-        if frame.world_from_camera is not None:
-            layout = room_masks(geometric.points, geometric.normals, frame.world_from_camera, self.room)
-        things = self._things(frame, geometric, layout) if frame.color is not None else []
-        return paint(layout, things, self._layout, geometric.labels.shape)
+        """Return the masks of a frame; one without colour has none."""
+        things = self._things(frame, geometric) if frame.color is not None else []
+        return paint(things, geometric.labels.shape)
 
-    def _things(self, frame: Frame, geometric: GeometricFrame, layout: dict[str, np.ndarray]) -> list[Thing]:
+    def _things(self, frame: Frame, geometric: GeometricFrame) -> list[Thing]:
         assert frame.color is not None
-        available = geometric.points[..., 2] > 0
-        for mask in layout.values():
-            available &= ~mask
-        geometry = frame_geometry(
-            geometric.labels, geometric.points, geometric.normals, available, frame.world_from_camera
-        )
+        geometry = frame_geometry(geometric.labels, geometric.points, geometric.normals, frame.world_from_camera)
         detections: Detections = self._detector.detect(frame.color)
         things = []
         for box, score, number in zip(detections.boxes, detections.scores, detections.classes, strict=True):
@@ -116,15 +91,6 @@ class DetectorBackend:
         return merge_duplicates(things)
 
 
-def _surface_samples(reader: FrameReader, settings: GeometricSettings) -> Iterator[SurfaceSample]:
-    every = max(1, len(reader) // SAMPLED_FRAMES)
-    for index in range(0, len(reader), every):
-        frame = reader.read(index, streams=("depth",))
-        if frame.depth is not None and frame.world_from_camera is not None:
-            geometric = segment_depth(frame.depth, reader.cameras[frame.camera_name], settings)
-            yield sample_surface(geometric.points, geometric.normals, frame.world_from_camera)
-
-
 def merge_duplicates(things: list[Thing]) -> list[Thing]:
     """Return the things with those merged that are the same, best score first.
 
@@ -147,16 +113,10 @@ def merge_duplicates(things: list[Thing]) -> list[Thing]:
     return merged
 
 
-def paint(
-    layout: dict[str, np.ndarray], things: list[Thing], classes: dict[str, SemanticClass], shape: tuple[int, ...]
-) -> PanopticFrame:
-    """Return one frame of masks: layout below, large things over it, small things on top (they stand in front)."""
+def paint(things: list[Thing], shape: tuple[int, ...]) -> PanopticFrame:
+    """Return one frame of masks: small things over large ones (they stand in front)."""
     ids = np.zeros(shape, dtype=np.int32)
     masks: dict[int, PanopticMask] = {}
-    for name, mask in layout.items():
-        if mask.any():
-            masks[len(masks) + 1] = PanopticMask(classes[name].id, is_thing=False)
-            ids[mask] = len(masks)
     for thing in sorted(things, key=lambda item: (-int(item.mask.sum()), -item.score)):
         masks[len(masks) + 1] = PanopticMask(thing.semantic.id, thing.semantic.kind == "thing", thing.score)
         ids[thing.mask] = len(masks)
@@ -170,7 +130,7 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
     Raises UsageError without a log, MissingDependency without weights, BadInput when they are no such detector.
     """
     parameters = request.parameters
-    sequence, reader = request.log()
+    reader = request.log()[1]
     if request.weights is None:
         raise MissingDependency(
             "--backend detector needs the weights of a detector",
@@ -190,12 +150,9 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
         tiles=parameters.tiles or 0,
     )
     return DetectorBackend(
-        sequence.info,
-        reader,
         load_vocabulary(),
         detector,
         label=label,
-        geometric=geometric_settings(parameters),
         minimum_pixels=parameters.small_object_pixels,
         witness=witness,
         threshold=parameters.score_threshold,

@@ -29,7 +29,7 @@ class FrameGeometry:
     points: np.ndarray
     """[m], camera frame."""
     available: np.ndarray
-    """bool: depth, and no pixel of floor, wall or ceiling."""
+    """bool: there is depth."""
     world_points: np.ndarray | None
     """[m], world frame; None without a pose."""
     upwardness: np.ndarray | None
@@ -39,17 +39,14 @@ class FrameGeometry:
 
 
 def frame_geometry(
-    labels: np.ndarray,
-    points: np.ndarray,
-    normals: np.ndarray,
-    available: np.ndarray,
-    world_from_camera: np.ndarray | None,
+    labels: np.ndarray, points: np.ndarray, normals: np.ndarray, world_from_camera: np.ndarray | None
 ) -> FrameGeometry:
     """Prepare a frame; all arrays (H, W, ...), camera frame."""
     world_points = upwardness = None
     if world_from_camera is not None:
         world_points = points @ world_from_camera[:3, :3].T + world_from_camera[:3, 3]
         upwardness = normals @ world_from_camera[2, :3]
+    available = points[..., 2] > 0
     pixels = np.bincount(labels[available], minlength=int(labels.max(initial=0)) + 1)
     return FrameGeometry(labels, points, available, world_points, upwardness, pixels)
 
