@@ -41,11 +41,14 @@ def usable_color(data: bytes, camera: Camera) -> np.ndarray | bytes:
     image = decode_as_calibrated(data, (camera.width, camera.height))
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes")
+    return data if is_kept(data, image, camera) else fitted_color(image, camera)
+
+
+def is_kept(data: bytes, image: np.ndarray, camera: Camera) -> bool:
+    """Whether the bytes of an `image` (H, W, 3) as it was decoded are, as they are, a picture of the camera."""
     if orientation_of(data) in TRANSPOSED and image_size(data) != (image.shape[1], image.shape[0]):
-        return fitted_color(image, camera)
-    if image.shape[:2] == (camera.height, camera.width) and _is_plain(data):
-        return data
-    return fitted_color(image, camera)
+        return False
+    return image.shape[:2] == (camera.height, camera.width) and _is_plain(data)
 
 
 def decode_as_calibrated(data: bytes, size: tuple[int, int]) -> np.ndarray | None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.folders.camera_groups import CameraGroup, grouped
+from scenewright.stages.ingest.folders.exr_depth import require_exr
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
@@ -23,7 +24,6 @@ from scenewright.stages.ingest.folders.files import (
     named_file,
     natural_key,
     pinhole,
-    refuse_exr,
     stream,
     text_stream,
 )
@@ -71,7 +71,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         raise BadInput(f"{model.folder}: no image is registered in the model", hint="COLMAP did not find any pose")
     colors = [named_file(image_folder, image.name, str(model.folder)) for image in images]
     depths, depth_words = _depths(root, images)
-    refuse_exr((path.name for path in depths if path), str(root))
+    require_exr(path.name for path in depths if path)
     has_depth = depth_words is not None
     has_color = not has_depth or any(path.is_file() for path in colors)
     recorded, notes_of_options = _recorded_cameras(model, images, colors, depths, parameters)

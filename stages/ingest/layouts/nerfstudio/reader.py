@@ -17,6 +17,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import opened
 from scenewright.stages.ingest.folders.camera_groups import grouped
+from scenewright.stages.ingest.folders.exr_depth import require_exr
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     all_intrinsics_given,
@@ -28,7 +29,6 @@ from scenewright.stages.ingest.folders.files import (
     natural_key,
     pinhole,
     read_json,
-    refuse_exr,
     stream,
     text_stream,
 )
@@ -105,7 +105,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         frames.sort(key=lambda frame: frame.time or 0.0)
     has_depth = any(frame.depth is not None for frame in frames)
     has_color = not has_depth or any(frame.color is not None and frame.color.is_file() for frame in frames)
-    refuse_exr((frame.depth.name for frame in frames if frame.depth is not None), str(file))
+    require_exr(frame.depth.name for frame in frames if frame.depth is not None)
     default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
     if not default_unit > 0:
         raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")

@@ -16,10 +16,13 @@ MOST_FRAMES = 10_000_000
 
 
 class VideoFrames:
-    """A video file, decoded forward. Raises BadInput when it cannot be opened."""
+    """A video file, decoded forward. Raises BadInput when it cannot be opened.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    A file may say that its pictures are to be turned, as phones do; `as_stored` leaves them as the camera took them.
+    """
+
+    def __init__(self, path: Path, *, as_stored: bool = False) -> None:
+        self.path, self._as_stored = path, as_stored
         self._capture = self._open()
         self._next = 0
         self.rate = float(self._capture.get(cv2.CAP_PROP_FPS))
@@ -56,6 +59,8 @@ class VideoFrames:
         capture = cv2.VideoCapture(str(self.path))
         if not capture.isOpened():
             raise BadInput(f"{self.path}: is no video that can be read", hint="export its frames as images")
+        if self._as_stored:
+            capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
         return capture
 
     def _count_frames(self) -> int:

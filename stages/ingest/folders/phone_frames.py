@@ -1,0 +1,191 @@
+"""Recordings of phones: depth smaller than the pictures, intrinsics of the full picture, confidence beside depth.
+
+Frames are those of the depth. Intrinsics change a little from picture to picture, as the lens focuses and is held
+still: then all are brought to the median ones. ARKit puts the origin of pixels at the centre of the first (ARCamera.h).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.ingest.folders.camera_groups import median_camera
+from scenewright.stages.ingest.folders.files import depth_form, file_bytes, pinhole
+from scenewright.stages.ingest.folders.frame_loading import (
+    FrameFormat,
+    FrameReads,
+    Size,
+    larger,
+    loader_of,
+    picture_camera,
+)
+from scenewright.stages.ingest.folders.undistortion import RecordedCamera, overridden_recording
+from scenewright.stages.ingest.images import decode_image
+from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera, StreamInfo, Unusable
+
+GRAVITY_ALIGNED = np.array([0.0, 1.0, 0.0])
+"""Up in ARKit's world, which it aligns with gravity (ARConfiguration.WorldAlignment.gravity)."""
+OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+"""Turns the camera axes of OpenCV into those of ARKit and OpenGL: y and z change sign."""
+CENTERED = 0.1
+"""Share of a picture's size within which the principal point of a phone lies from its middle; by eye."""
+
+
+@dataclass(frozen=True)
+class PhoneFrame:
+    """One frame as the recorder wrote it."""
+
+    name: str
+    time: float
+    intrinsics: Sequence[float]
+    """fx fy cx cy of the full picture."""
+    pose: np.ndarray | None
+    """(4, 4) world_from_camera, OpenCV axes."""
+    reads: FrameReads
+    problem: str | None = None
+    files: FrameFiles = FrameFiles()
+    stamp: int | None = None
+
+
+@dataclass(frozen=True)
+class PhoneLog:
+    """All frames of a recording."""
+
+    where: str
+    frames: Sequence[PhoneFrame]
+    full_size: Size
+    """Of the pictures that the intrinsics are of."""
+    picture_size: Size | None
+    """Of the pictures as they are stored; None without any."""
+    depth_size: Size | None
+    units_per_metre: float
+    notes: tuple[str, ...]
+    streams: tuple[StreamInfo, ...]
+    up_in_log: np.ndarray | None = None
+    damage: tuple[str, ...] = ()
+    missing: dict[str, str] = field(default_factory=dict)
+    close: Callable[[], None] = field(default=lambda: None)
+
+
+def phone_source(name: str, rule: str, log: PhoneLog, parameters: IngestParameters) -> LogSource:
+    """Return the recording as a source of the format `name`. Raises BadInput where pictures, depth and intrinsics have
+    not one shape."""
+    size = log.depth_size or log.picture_size
+    _check_shapes(log)
+    has_color, has_depth = log.picture_size is not None, log.depth_size is not None
+    kinds = {tuple(frame.intrinsics): _recorded(frame.intrinsics, log, size, parameters) for frame in log.frames}
+    recorded = [kinds[tuple(frame.intrinsics)] for frame in log.frames]
+    if not recorded:
+        raise BadInput(f"{log.where}: has no frames")
+    cameras = [each.camera for each in recorded]
+    camera = cameras[0] if len(set(cameras)) == 1 else median_camera(cameras)
+    form, unit_note = depth_form(parameters, log.units_per_metre)
+    kept = larger(log.picture_size, size)
+    entries = tuple(
+        Entry(
+            frame.name,
+            frame.time,
+            frame.pose,
+            loader_of(frame.reads, FrameFormat(own, camera, has_color, has_depth, form, kept)),
+            frame.problem or _absence(frame.reads, has_color, has_depth),
+            files=frame.files,
+            stamp=frame.stamp,
+        )
+        for frame, own in zip(log.frames, recorded, strict=True)
+    )
+    notes = [*log.notes, *_intrinsics_notes(parameters, recorded[0])]
+    if len(set(cameras)) > 1:
+        notes.append(f"{len(set(cameras))} different intrinsics: images are resampled to the median ones")
+    if kept is not None:
+        notes.append(f"colour brought to the depth's {size_words(size)}; pictures of {size_words(kept)} are kept")
+    with_levels = sum(frame.reads.levels is not None for frame in log.frames)
+    if has_depth:
+        notes.append(unit_note)
+        notes.append(_levels_note(with_levels, len(log.frames)))
+    return LogSource(
+        name,
+        rule,
+        (SourceCamera("camera", camera, picture=picture_camera(camera, kept)),),
+        entries,
+        tuple(notes),
+        up_in_log=log.up_in_log,
+        has_deviation=with_levels > 0,
+        damage=log.damage,
+        streams=log.streams,
+        missing=log.missing,
+        close=log.close,
+    )
+
+
+def level_image(path: Path, table: dict[int, int] | None = None) -> np.ndarray:
+    """Return the confidence (H, W) uint8 0..2 in a grey picture; `table` says the level of each value it may have.
+    Raises Unusable."""
+    image = decode_image(file_bytes(path, "confidence"))
+    if image is not None and image.ndim == 3:
+        image = image[..., 0]  # grey, written as colour
+    if image is None or image.dtype != np.uint8:
+        raise Unusable("undecodable_confidence", path.name)
+    if table is None:
+        return image
+    levels = np.full(256, 255, np.uint8)
+    levels[list(table)] = list(table.values())
+    return levels[image]
+
+
+def full_picture_size(intrinsics: Sequence[float], candidates: Sequence[Size | None]) -> Size | None:
+    """Return the first size in whose middle the principal point of fx fy cx cy lies, None where it is in none's."""
+    for size in candidates:
+        if size is not None and all(
+            abs(center / extent - 0.5) <= CENTERED for center, extent in zip(intrinsics[2:], size, strict=True)
+        ):
+            return size
+    return None
+
+
+def size_words(size: Size | None) -> str:
+    """Return a size for people."""
+    return "no size" if size is None else f"{size[0]}x{size[1]}"
+
+
+def _recorded(
+    intrinsics: Sequence[float], log: PhoneLog, size: Size | None, parameters: IngestParameters
+) -> RecordedCamera:
+    full = RecordedCamera(pinhole(intrinsics, log.full_size, log.where)).at(size, log.where)
+    return overridden_recording(full, parameters)[0]
+
+
+def _intrinsics_notes(parameters: IngestParameters, recorded: RecordedCamera) -> tuple[str, ...]:
+    return overridden_recording(recorded, parameters)[1]
+
+
+def _absence(reads: FrameReads, has_color: bool, has_depth: bool) -> str | None:
+    if has_color and reads.color is None:
+        return "missing_color"
+    return "missing_depth" if has_depth and reads.depth is None else None
+
+
+def _levels_note(count: int, frames: int) -> str:
+    if not count:
+        return "no confidence beside depth: every pixel of depth counts the same"
+    some = "" if count == frames else f", of {count} of {frames} frames"
+    return f"confidence levels read as a standard deviation of depth{some} (stages/ingest/confidence_levels.py)"
+
+
+def _check_shapes(log: PhoneLog) -> None:
+    """A phone turns pictures, depth and intrinsics together; whoever converts one of them alone turns it alone."""
+    for what, size in (("pictures", log.picture_size), ("depth", log.depth_size)):
+        if size is None:
+            continue
+        (width, height), (full_width, full_height) = size, log.full_size
+        if (width > height) != (full_width > full_height) and abs(width * full_width - height * full_height) < max(
+            width, height, full_width, full_height
+        ):
+            raise BadInput(
+                f"{log.where}: {what} are {width}x{height}, intrinsics are of {full_width}x{full_height}: one of them "
+                "was turned by a quarter",
+                hint="give the files as the app wrote them; programs that convert a video turn it",
+            )
