@@ -10,7 +10,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.pose_convention_names import PoseConvention
 from scenewright.stages.ingest.registry import all_layouts
 from scenewright.stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
-from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.stages.kit.stage import External, Extra, Optionally, Parameters, Stage
 
 if TYPE_CHECKING:
     LogFormatName = str
@@ -136,6 +136,10 @@ STAGE = Stage(
         "numba",
         "lz4",
         "ruamel.yaml",
+    ),
+    extras=(
+        Extra("OpenEXR", "OpenEXR", "depth in .exr files: pip install OpenEXR"),
+        Extra("lzfse", "lzfse", "Record3D's .r3d files: pip install lzfse"),
     ),
     example="scenewright ingest --log recording.mcap --out outputs/kitchen/sequence",
     check=check,
