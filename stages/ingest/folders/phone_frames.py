@@ -178,14 +178,20 @@ def _levels_note(count: int, frames: int) -> str:
 def _check_shapes(log: PhoneLog) -> None:
     """A phone turns pictures, depth and intrinsics together; whoever converts one of them alone turns it alone."""
     for what, size in (("pictures", log.picture_size), ("depth", log.depth_size)):
-        if size is None:
+        if size is None or _alike(size, log.full_size):
             continue
-        (width, height), (full_width, full_height) = size, log.full_size
-        if (width > height) != (full_width > full_height) and abs(width * full_width - height * full_height) < max(
-            width, height, full_width, full_height
-        ):
+        words = f"{log.where}: {what} of {size_words(size)} do not have the shape of {size_words(log.full_size)}"
+        if _alike((size[1], size[0]), log.full_size):
             raise BadInput(
-                f"{log.where}: {what} are {width}x{height}, intrinsics are of {full_width}x{full_height}: one of them "
-                "was turned by a quarter",
+                f"{words}, of which the intrinsics are: they were turned by a quarter",
                 hint="give the files as the app wrote them; programs that convert a video turn it",
             )
+        raise BadInput(
+            f"{words}, of which the intrinsics are, and nothing says what was cut off",
+            hint="record with the app's 4:3 setting, in which depth and pictures are of one shape",
+        )
+
+
+def _alike(first: Size, second: Size) -> bool:
+    """Whether two sizes are of one shape, to a pixel."""
+    return abs(first[0] * second[1] - first[1] * second[0]) <= max(*first, *second)

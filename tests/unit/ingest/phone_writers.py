@@ -85,7 +85,7 @@ def write_video(path: Path, pictures: list[np.ndarray], *, turned: bool = True) 
     writer.release()
     data = bytearray(path.read_bytes())
     if turned:
-        matrix = data.index(b"tkhd") + 4 + 36
+        matrix = data.index(b"tkhd") + 4 + 40
         data[matrix : matrix + 36] = ROTATED
     path.write_bytes(bytes(data))
 

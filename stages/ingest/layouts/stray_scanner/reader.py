@@ -7,7 +7,14 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.ingest.folders.files import depth_image_size, images_by_number, raw_depth, stream, text_stream
+from scenewright.stages.ingest.folders.files import (
+    all_intrinsics_given,
+    depth_image_size,
+    images_by_number,
+    raw_depth,
+    stream,
+    text_stream,
+)
 from scenewright.stages.ingest.folders.frame_loading import FrameReads, Size
 from scenewright.stages.ingest.folders.phone_frames import (
     GRAVITY_ALIGNED,
@@ -46,11 +53,13 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         depth_size = depth_image_size(depths.values())
         picture_size = video.size if video is not None else None
         full_size = full_picture_size(matrix, (picture_size, _turned(picture_size), RECORDED))
+        if full_size is None and all_intrinsics_given(parameters):
+            full_size = depth_size or picture_size
         if full_size is None:
             raise BadInput(
                 f"{root / MATRIX}: centre {matrix[2]:g}, {matrix[3]:g} is not that of pictures of "
-                f"{size_words(picture_size)} pixels",
-                hint="put the app's own camera_matrix.csv and rgb.mp4 there",
+                f"{size_words(picture_size or RECORDED)} pixels",
+                hint="give --fx --fy --cx --cy of the depth, or put the app's own camera_matrix.csv there",
             )
         frames = _frames(rows, depths, levels, video, matrix, parameters)
         has_times = rows[0].stamp is not None
@@ -141,8 +150,9 @@ def _count_notes(rows: list[Odometry], video: VideoFrames | None) -> tuple[str, 
     if video is None:
         return (f"there is no {VIDEO}: depth alone is read",)
     if video.count == len(rows):
-        return ()
+        return video.notes
     return (
+        *video.notes,
         f"WARNING: {ODOMETRY} has {len(rows)} poses and {VIDEO} {video.count} frames: "
         "frames that have not both are left out",
     )
