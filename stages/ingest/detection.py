@@ -10,13 +10,7 @@ from typing import NamedTuple
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import OF_TOPICS
 from scenewright.stages.ingest.eye_order import settled_eyes
-from scenewright.stages.ingest.foreign import (
-    SHOWN,
-    meant_to_be_read,
-    refuse_foreign_file,
-    refuse_foreign_folder,
-    refuse_lone_recording,
-)
+from scenewright.stages.ingest.foreign import SHOWN, meant_to_be_read, refuse_foreign_file, refuse_lone_recording
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.registry import LogLayout, all_layouts
 from scenewright.stages.ingest.source import LogSource
@@ -56,7 +50,6 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
         reader = log_format(layout)
         rule = reader.matches(path)
         if rule is not None and guessed and layout.name == OF_ANY_IMAGES:
-            refuse_foreign_folder(path)
             refuse_logs_within(path)
         if rule is not None:
             _check_topics(layout, parameters, path)
@@ -67,7 +60,6 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
                 source.close()
                 raise
     if path.is_dir():
-        refuse_foreign_folder(path)
         refuse_logs_within(path)
         refuse_lone_recording(path)
     names = ", ".join(layout.name for layout in layouts)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,15 +85,6 @@ def refuse_foreign_file(path: Path) -> None:
     _refuse(path, found)
 
 
-def refuse_foreign_folder(root: Path) -> None:
-    """Raise BadInput for a folder as another tool wrote it."""
-    if meant_to_be_read(root):
-        return
-    for found, is_one in FOLDERS:
-        if is_one(root):
-            _refuse(root, found)
-
-
 def meant_to_be_read(root: Path) -> bool:
     """Whether a calibration or poses lie in a folder: whoever puts them there means its pictures."""
     return calibration_file(root) is not None or pose_file(root) is not None
@@ -120,29 +110,3 @@ def _refuse(path: Path, found: Foreign) -> None:
 def _head(path: Path) -> bytes:
     with opened(path) as file:
         return file.read(HEAD)
-
-
-def _is_scanner_app(root: Path) -> bool:
-    return (root / "frame_00000.jpg").is_file() and (root / "frame_00000.json").is_file()
-
-
-def _is_arkit_scenes(root: Path) -> bool:
-    return (root / "lowres_depth").is_dir() and any(root.glob("*.traj"))
-
-
-FOLDERS: tuple[tuple[Foreign, Callable[[Path], bool]], ...] = (
-    (
-        Foreign(
-            "a recording of the 3D Scanner App",
-            "write its poses and intrinsics as transforms.json (docs/LOGS.md, layout nerfstudio)",
-        ),
-        _is_scanner_app,
-    ),
-    (
-        Foreign(
-            "a recording of ARKitScenes",
-            "write its poses and intrinsics as transforms.json (docs/LOGS.md, layout nerfstudio)",
-        ),
-        _is_arkit_scenes,
-    ),
-)

@@ -61,10 +61,10 @@ def decode_as_calibrated(data: bytes, size: tuple[int, int]) -> np.ndarray | Non
     if image is None or (orientation := orientation_of(data)) not in TRANSPOSED:
         return image
     stored, looked_at = (image.shape[1], image.shape[0]), (image.shape[0], image.shape[1])
-    return turned(image, orientation) if _alike(looked_at, size) and not _alike(stored, size) else image
+    return turned(image, orientation) if same_shape(looked_at, size) and not same_shape(stored, size) else image
 
 
-def _alike(first: tuple[int, int], second: tuple[int, int]) -> bool:
+def same_shape(first: tuple[int, int], second: tuple[int, int]) -> bool:
     """Whether two sizes are of one shape, to a pixel."""
     return abs(first[0] * second[1] - first[1] * second[0]) <= max(*first, *second)
 

@@ -5,14 +5,14 @@ Where pictures are larger than depth, frames are those of the depth, and the pic
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.confidence_levels import deviation_of_levels
-from scenewright.stages.ingest.folders.files import file_bytes, raw_depth, resized_camera
+from scenewright.stages.ingest.folders.files import color_image_size, file_bytes, raw_depth, resized_camera
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, undistorted
 from scenewright.stages.ingest.images import (
     DepthForm,
@@ -20,6 +20,7 @@ from scenewright.stages.ingest.images import (
     depth_millimetres,
     fitted_color,
     is_kept,
+    same_shape,
     usable_color,
 )
 from scenewright.stages.ingest.source import FrameFiles, LoadedFrame, Unusable
@@ -58,8 +59,17 @@ class FrameReads:
 
 
 def larger(pictures: Size | None, frames: Size | None) -> Size | None:
-    """Return the size of pictures where they are larger than the frames, else None."""
-    return pictures if pictures and frames and pictures[0] > frames[0] and pictures[1] > frames[1] else None
+    """Return the size of pictures where they are larger than the frames and of their shape, else None."""
+    if pictures is None or frames is None or not same_shape(pictures, frames):
+        return None
+    return pictures if pictures[0] > frames[0] and pictures[1] > frames[1] else None
+
+
+def kept_pictures(colors: Iterable[Path | None], camera: Camera) -> Size | None:
+    """Return the size of the pictures of a camera where they are larger than its frames and of their shape, else
+    None."""
+    size = color_image_size((path for path in colors if path is not None), (camera.width, camera.height))
+    return larger(size, (camera.width, camera.height))
 
 
 def picture_camera(camera: Camera, size: Size | None) -> Camera | None:

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.folders.camera_groups import median_camera
-from scenewright.stages.ingest.folders.files import depth_form, file_bytes, pinhole
+from scenewright.stages.ingest.folders.files import depth_form, file_bytes, pinhole, read_json
 from scenewright.stages.ingest.folders.frame_loading import (
     FrameFormat,
     FrameReads,
@@ -23,7 +24,7 @@ from scenewright.stages.ingest.folders.frame_loading import (
     picture_camera,
 )
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, overridden_recording
-from scenewright.stages.ingest.images import decode_image
+from scenewright.stages.ingest.images import decode_image, same_shape
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, SourceCamera, StreamInfo, Unusable
 
@@ -136,6 +137,25 @@ def level_image(path: Path, table: dict[int, int] | None = None) -> np.ndarray:
     return levels[image]
 
 
+def json_object(path: Path) -> dict[str, Any]:
+    """Return the object in a JSON file, an empty one for what is none: its frame is left out, and counted."""
+    try:
+        document = read_json(path)
+    except BadInput:
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def numbers_of(values: object, count: int) -> tuple[float, ...] | None:
+    """Return `count` finite numbers of a list, flat or of rows, None for anything else."""
+    if isinstance(values, list) and values and all(isinstance(row, list) for row in values):
+        values = [value for row in values for value in row]
+    if not isinstance(values, list) or len(values) != count:
+        return None
+    plain = all(isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e9 for value in values)
+    return tuple(float(value) for value in values) if plain else None
+
+
 def full_picture_size(intrinsics: Sequence[float], candidates: Sequence[Size | None]) -> Size | None:
     """Return the first size in whose middle the principal point of fx fy cx cy lies, None where it is in none's."""
     for size in candidates:
@@ -178,10 +198,10 @@ def _levels_note(count: int, frames: int) -> str:
 def _check_shapes(log: PhoneLog) -> None:
     """A phone turns pictures, depth and intrinsics together; whoever converts one of them alone turns it alone."""
     for what, size in (("pictures", log.picture_size), ("depth", log.depth_size)):
-        if size is None or _alike(size, log.full_size):
+        if size is None or same_shape(size, log.full_size):
             continue
         words = f"{log.where}: {what} of {size_words(size)} do not have the shape of {size_words(log.full_size)}"
-        if _alike((size[1], size[0]), log.full_size):
+        if same_shape((size[1], size[0]), log.full_size):
             raise BadInput(
                 f"{words}, of which the intrinsics are: they were turned by a quarter",
                 hint="give the files as the app wrote them; programs that convert a video turn it",
@@ -190,8 +210,3 @@ def _check_shapes(log: PhoneLog) -> None:
             f"{words}, of which the intrinsics are, and nothing says what was cut off",
             hint="record with the app's 4:3 setting, in which depth and pictures are of one shape",
         )
-
-
-def _alike(first: Size, second: Size) -> bool:
-    """Whether two sizes are of one shape, to a pixel."""
-    return abs(first[0] * second[1] - first[1] * second[0]) <= max(*first, *second)

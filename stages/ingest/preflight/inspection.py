@@ -13,7 +13,7 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.manifest import MANIFEST_NAME
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.detection import log_format, open_log, refuse_logs_within
-from scenewright.stages.ingest.foreign import refuse_foreign_folder, refuse_lone_recording
+from scenewright.stages.ingest.foreign import refuse_lone_recording
 from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
@@ -111,7 +111,6 @@ def _refuse_what_is_nothing(path: Path, parameters: IngestParameters) -> None:
     if not (path.is_dir() and parameters.format == "auto"):
         return
     if not any(log_format(layout).matches(path) for layout in all_layouts()):
-        refuse_foreign_folder(path)
         refuse_logs_within(path)
         refuse_lone_recording(path)
         raise BadInput(

@@ -1,7 +1,9 @@
 """Recordings of the tiny room as the apps of phones write them, from what their makers publish of the form.
 
 Stray Scanner: strayrobots/scanner, docs/format.md and OdometryEncoder.swift. Record3D: marek-simonik/record3d, issues
-7, 27, 36 and 93. Polycam: PolyCam/polyform, README. No reader of ours is used.
+7, 27, 36 and 93. Polycam: PolyCam/polyform, README. 3D Scanner App: its JSON files, as public scripts read them.
+ARKitScenes: apple/ARKitScenes, tenFpsDataLoader.py. ScanNet++: scannetpp/scannetpp, iphone/. NeRFCapture:
+jc211/NeRFCapture, DatasetWriter.swift. No reader of ours is used.
 """
 
 from __future__ import annotations
@@ -191,4 +193,91 @@ def write_polycam(root: Path, take: Take, *, corrected: bool = True) -> Path:
         (root / "keyframes" / "depth" / f"{name}.png").write_bytes(millimetres(take.depths[index]))
         (root / "keyframes" / "confidence" / f"{name}.png").write_bytes(png(levels))
     (root / "mesh_info.json").write_text("{}")
+    return root
+
+
+def write_scanner_app(root: Path, take: Take) -> Path:
+    """Write `All Data` of the 3D Scanner App; every second frame has a picture."""
+    root.mkdir(parents=True)
+    for index in range(take.count):
+        pose = take.world_from_camera[index] @ ARKIT_FROM_OPENCV
+        fx, fy, cx, cy = take.intrinsics[index].tolist()
+        document = {
+            "cameraPoseARFrame": pose.reshape(-1).tolist(),
+            "intrinsics": [fx, 0, cx, 0, fy, cy, 0, 0, 1],
+            "time": take.time(index),
+            "frame_index": index,
+        }
+        (root / f"frame_{index:05d}.json").write_text(json.dumps(document))
+        (root / f"depth_{index:05d}.png").write_bytes(millimetres(take.depths[index]))
+        (root / f"conf_{index:05d}.png").write_bytes(png(take.levels[index].astype(np.uint8)))
+        if index % 2 == 0:
+            (root / f"frame_{index:05d}.jpg").write_bytes(jpeg(take.pictures[index]))
+    (root / "info.json").write_text("{}")
+    return root
+
+
+def write_arkit_scenes(root: Path, take: Take) -> Path:
+    """Write a raw recording; names have milliseconds, poses are of camera_from_world."""
+    for name in ("lowres_depth", "confidence", "wide", "wide_intrinsics"):
+        (root / name).mkdir(parents=True)
+    rows = []
+    for index in range(take.count):
+        stem = f"41069021_{take.time(index):.3f}"
+        (root / "lowres_depth" / f"{stem}.png").write_bytes(millimetres(take.depths[index]))
+        (root / "confidence" / f"{stem}.png").write_bytes(png(take.levels[index].astype(np.uint8)))
+        (root / "wide" / f"{stem}.png").write_bytes(png(take.pictures[index]))
+        numbers = " ".join(f"{number:.6f}" for number in take.intrinsics[index])
+        (root / "wide_intrinsics" / f"{stem}.pincam").write_text(f"{FULL.width} {FULL.height} {numbers}")
+        view = np.linalg.inv(take.world_from_camera[index])
+        values = [take.time(index), *Rotation.from_matrix(view[:3, :3]).as_rotvec(), *view[:3, 3]]
+        rows.append(" ".join(f"{value:.9f}" for value in values))
+    (root / "lowres_wide.traj").write_text("\n".join(rows) + "\n")
+    return root
+
+
+def write_scannetpp(root: Path, take: Take) -> Path:
+    """Write the folder `iphone` of a scene, whose depth was taken out of depth.bin."""
+    (root / "iphone" / "depth").mkdir(parents=True)
+    write_video(root / "iphone" / "rgb.mp4", take.pictures, turned=False)
+    (root / "iphone" / "rgb.mp4").rename(root / "iphone" / "rgb.mkv")
+    document = {}
+    for index in range(take.count):
+        fx, fy, cx, cy = take.intrinsics[index].tolist()
+        document[f"frame_{index:06d}"] = {
+            "pose": np.eye(4).tolist(),
+            "aligned_pose": take.world_from_camera[index].tolist(),
+            "intrinsic": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]],
+            "timestamp": take.time(index),
+        }
+        (root / "iphone" / "depth" / f"frame_{index:06d}.png").write_bytes(millimetres(take.depths[index]))
+    (root / "iphone" / "pose_intrinsic_imu.json").write_text(json.dumps(document))
+    return root
+
+
+def write_nerfcapture(root: Path, take: Take, *, depth: bool = True) -> Path:
+    """Write a NeRFCapture recording; the app names files of depth that only its streaming script writes."""
+    (root / "images").mkdir(parents=True)
+    frames = []
+    for index in range(take.count):
+        (root / "images" / f"{index}.png").write_bytes(png(take.pictures[index]))
+        if depth:
+            stored = np.rint(take.depths[index] / 10 * 65535).astype(np.uint16)
+            (root / "images" / f"{index}.depth.png").write_bytes(png(stored))
+        fx, fy, cx, cy = take.intrinsics[index].tolist()
+        frames.append(
+            {
+                "file_path": f"images/{index}",
+                "depth_path": f"images/{index}.depth.png",
+                "transform_matrix": (take.world_from_camera[index] @ ARKIT_FROM_OPENCV).tolist(),
+                "timestamp": take.time(index),
+                "fl_x": fx,
+                "fl_y": fy,
+                "cx": cx,
+                "cy": cy,
+                "w": FULL.width,
+                "h": FULL.height,
+            }
+        )
+    (root / "transforms.json").write_text(json.dumps({"integer_depth_scale": 10 / 65535, "frames": frames}))
     return root

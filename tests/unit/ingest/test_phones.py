@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.confidence_levels import deviation_of_levels
 from scenewright.stages.ingest.detection import open_log
@@ -17,18 +20,24 @@ from scenewright.stages.kit.geometry.cameras import back_project, project
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 
 from tests.real_data import real_data
+from tests.unit.ingest.folder_writers import write_colmap, write_nerfstudio, write_scannet
 from tests.unit.ingest.loading import loaded_frames
 from tests.unit.ingest.phone_writers import (
     DEPTH,
     FULL,
     Take,
     unpack_r3d,
+    write_arkit_scenes,
+    write_nerfcapture,
     write_polycam,
     write_r3d,
     write_record3d_export,
+    write_scanner_app,
+    write_scannetpp,
     write_stray_scanner,
 )
 from tests.unit.ingest.running import ingest
+from tests.unit.ingest.tiny_room import CAMERA, frames
 
 WRITERS: dict[str, tuple[str, Callable[[Path, Take], Path]]] = {
     "stray": ("stray-scanner", lambda root, take: write_stray_scanner(root, take)),
@@ -47,6 +56,82 @@ WITHOUT_CONFIDENCE = ("record3d-exr", "record3d-below")
 @pytest.fixture(scope="module")
 def take() -> Take:
     return Take()
+
+
+OTHERS: dict[str, tuple[Callable[[Path, Take], Path], tuple[int, ...]]] = {
+    "scanner-app": (write_scanner_app, (0, 2, 4)),
+    "arkit-scenes": (write_arkit_scenes, (0, 1, 2, 3, 4, 5)),
+    "scannetpp": (write_scannetpp, (0, 1, 2, 3, 4, 5)),
+    "nerfstudio": (write_nerfcapture, (0, 1, 2, 3, 4, 5)),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_recordings_of_phones_give_the_take(tmp_path: Path, take: Take, name: str) -> None:
+    write, numbers = OTHERS[name]
+    source, frames = loaded_frames(write(tmp_path / "log", take))
+    assert source.format == name and len(frames) == len(numbers)
+    half = 0.5 / 7.5 if name == "nerfstudio" else 0.0  # pixels of transforms.json begin at the edge of the first
+    assert source.camera.cx == pytest.approx(DEPTH.cx - half, abs=1e-4)
+    picture = source.cameras[0].picture
+    assert picture is not None and (picture.width, picture.height) == (FULL.width, FULL.height)
+    for index, entry, frame in zip(numbers, source.entries, frames, strict=True):
+        assert np.abs(entry.world_from_camera - take.world_from_camera[index]).max() < 1e-3
+        assert entry.time == pytest.approx(take.time(index), abs=6e-4)
+        assert np.abs(frame.depth / 1000 - take.depths[index]).max() < 1.1e-3
+        assert (frame.deviation is not None) == (name in ("scanner-app", "arkit-scenes"))
+        found = frame.picture if isinstance(frame.picture, np.ndarray) else _decoded(frame.picture)
+        assert np.abs(found.astype(int) - take.pictures[index]).mean() < 6
+
+
+def test_files_that_nerfcapture_names_and_never_wrote_are_no_depth(tmp_path: Path, take: Take) -> None:
+    source, frames = loaded_frames(write_nerfcapture(tmp_path / "log", take, depth=False))
+    assert len(frames) == take.count and all(frame.depth is None and frame.picture is None for frame in frames)
+    assert (source.camera.width, source.camera.height) == (FULL.width, FULL.height)
+
+
+def test_depth_that_is_still_packed(tmp_path: Path, take: Take) -> None:
+    log = write_scannetpp(tmp_path / "log", take)
+    shutil.rmtree(log / "iphone" / "depth")
+    (log / "iphone" / "depth.bin").write_bytes(bytes(8))
+    with pytest.raises(BadInput, match=r"packed in depth.bin \(take the depth out .* iphone.prepare_iphone_data"):
+        open_log(log, IngestParameters())
+
+
+def test_stray_scanner_without_its_matrix(tmp_path: Path, take: Take) -> None:
+    log = write_stray_scanner(tmp_path / "log", take)
+    (log / "camera_matrix.csv").unlink()
+    source, frames = loaded_frames(log)
+    assert source.camera.cx == pytest.approx(DEPTH.cx) and len(frames) == take.count
+
+
+@pytest.mark.parametrize("write", [write_nerfstudio, write_colmap])
+def test_other_layouts_keep_pictures_that_are_larger_than_depth(tmp_path: Path, write: Callable) -> None:
+    """The reader of the layout is given colour of twice the size; what it says of intrinsics stays."""
+    log = write(tmp_path / "log", frames(3))
+    for path in sorted(path for path in log.rglob("*") if path.suffix in (".png", ".jpg")):
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        if image.dtype == np.uint8:
+            cv2.imwrite(str(path), cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST))
+    source, loaded = loaded_frames(log)
+    assert (source.camera.width, source.camera.height) == (CAMERA.width, CAMERA.height)
+    picture = source.cameras[0].picture
+    assert picture is not None and (picture.width, picture.height) == (2 * CAMERA.width, 2 * CAMERA.height)
+    for frame in loaded:
+        found = frame.picture if isinstance(frame.picture, np.ndarray) else _decoded(frame.picture)
+        assert found.shape[:2] == (2 * CAMERA.height, 2 * CAMERA.width)
+        assert np.abs(found[::2, ::2].astype(int) - frame.color).mean() < 4
+
+
+def test_scannet_keeps_pictures_of_their_own_camera(tmp_path: Path) -> None:
+    log = write_scannet(tmp_path / "log", frames(3))
+    for path in (log / "color").iterdir():
+        cv2.imwrite(str(path), cv2.resize(cv2.imread(str(path)), None, fx=2, fy=2))
+    source, loaded = loaded_frames(log)
+    picture = source.cameras[0].picture
+    assert picture is not None and picture.width > source.camera.width
+    stored = cv2.imread(str(sorted((log / "color").iterdir())[0]))
+    assert (_decoded(loaded[0].picture)[..., ::-1] == stored).all()
 
 
 @pytest.mark.parametrize("name", WRITERS)

@@ -20,7 +20,6 @@ from scenewright.stages.ingest.folders.files import (
     images_of_subfolder,
     natural_key,
     raw_depth,
-    read_json,
     stream,
 )
 from scenewright.stages.ingest.folders.frame_loading import FrameReads, Size
@@ -29,7 +28,9 @@ from scenewright.stages.ingest.folders.phone_frames import (
     OPENGL_FROM_OPENCV,
     PhoneFrame,
     PhoneLog,
+    json_object,
     level_image,
+    numbers_of,
     phone_source,
 )
 from scenewright.stages.ingest.parameters import IngestParameters
@@ -53,7 +54,7 @@ def _root(path: Path) -> Path | None:
     for root in (path / "keyframes", path):
         for _, cameras in (CORRECTED, ORIGINAL):
             first = min((root / cameras).glob("*.json"), default=None)
-            if first is not None and "t_00" in _document(first):
+            if first is not None and "t_00" in json_object(first):
                 return root
     return None
 
@@ -66,10 +67,8 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     image_folder, camera_folder = CORRECTED if corrected else ORIGINAL
     colors = _images(root / image_folder, COLOR_SUFFIXES)
     depths, levels = _images(root / "depth", (".png",)), _images(root / "confidence", (".png",))
-    cameras = {file.stem: _document(file) for file in sorted((root / camera_folder).glob("*.json"))}
-    stated = {
-        stem: camera for stem, camera in cameras.items() if _numbers(camera, ("fx", "fy", "cx", "cy")) is not None
-    }
+    cameras = {file.stem: json_object(file) for file in sorted((root / camera_folder).glob("*.json"))}
+    stated = {stem: camera for stem, camera in cameras.items() if _intrinsics(camera) is not None}
     if not stated:
         raise BadInput(f"{root / camera_folder}: no file states fx, fy, cx, cy", hint="export the raw data again")
     names = sorted({*colors, *cameras, *_images(root / "images", COLOR_SUFFIXES)}, key=natural_key)
@@ -78,7 +77,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     frames = []
     for index, name in enumerate(names):
         camera = cameras.get(name, {})
-        intrinsics = _numbers(camera, ("fx", "fy", "cx", "cy"))
+        intrinsics = _intrinsics(camera)
         pose, problem = _pose(camera)
         stamp = int(name) * 1000 if timed else None
         color, depth, level = colors.get(name), depths.get(name), levels.get(name)
@@ -86,9 +85,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
             PhoneFrame(
                 name=name,
                 time=index / parameters.frame_rate if stamp is None else stamp * 1e-9,
-                intrinsics=_numbers(next(iter(stated.values())), ("fx", "fy", "cx", "cy")) or ()
-                if intrinsics is None
-                else intrinsics,
+                intrinsics=_intrinsics(next(iter(stated.values()))) or () if intrinsics is None else intrinsics,
                 pose=pose,
                 reads=FrameReads(
                     None if color is None else partial(file_bytes, color, "color"),
@@ -127,31 +124,19 @@ def _images(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
     return images_of_subfolder(folder if folder.is_dir() else None, suffixes)
 
 
-def _document(path: Path) -> dict[str, Any]:
-    """Return the object in a JSON file, an empty one for what is none: its key frame is left out, and counted."""
-    try:
-        document = read_json(path)
-    except BadInput:
-        return {}
-    return document if isinstance(document, dict) else {}
-
-
-def _numbers(camera: dict[str, Any], names: tuple[str, ...]) -> tuple[float, ...] | None:
-    values = [camera.get(name) for name in names]
-    if not all(isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e9 for value in values):
-        return None
-    return tuple(float(value) for value in values if value is not None)
+def _intrinsics(camera: dict[str, Any]) -> tuple[float, ...] | None:
+    return numbers_of([camera.get(name) for name in ("fx", "fy", "cx", "cy")], 4)
 
 
 def _pose(camera: dict[str, Any]) -> tuple[np.ndarray | None, str | None]:
-    numbers = _numbers(camera, tuple(f"t_{row}{column}" for row in range(3) for column in range(4)))
+    numbers = numbers_of([camera.get(f"t_{row}{column}") for row in range(3) for column in range(4)], 12)
     if numbers is None:
         return None, "unreadable_pose"
     return np.vstack([np.reshape(numbers, (3, 4)), [0, 0, 0, 1]]) @ OPENGL_FROM_OPENCV, None
 
 
 def _full_size(camera: dict[str, Any], where: Path) -> Size:
-    size = _numbers(camera, ("width", "height"))
+    size = numbers_of([camera.get("width"), camera.get("height")], 2)
     if size is None or not all(1 <= value <= LARGEST_SIZE for value in size):
         raise BadInput(f"{where}: width and height state no size", hint="export the raw data again")
     return round(size[0]), round(size[1])

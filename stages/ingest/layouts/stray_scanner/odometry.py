@@ -11,11 +11,14 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import opened
 from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.formats.trajectories import read_text, transform_from_numbers
 
 POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 INTRINSICS = ("fx", "fy", "cx", "cy")
+HEADER = 4096
+"""Bytes within which the first line ends."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,18 @@ def read_camera_matrix(path: Path) -> tuple[float, float, float, float]:
     if len(numbers) != 9 or numbers[6:] != [0, 0, 1]:
         raise BadInput(f"{path}: is no 3x3 camera matrix", hint="three lines of three numbers, the last 0, 0, 1")
     return numbers[0], numbers[4], numbers[2], numbers[5]
+
+
+def has_intrinsics(path: Path) -> bool:
+    """Whether the first line names poses and intrinsics."""
+    with opened(path) as file:
+        names = {field.strip() for field in file.readline(HEADER).decode("utf-8", "replace").split(",")}
+    return names.issuperset((*POSE, *INTRINSICS))
+
+
+def usual_intrinsics(rows: list[Odometry]) -> tuple[float, ...]:
+    """Return those of the first row that has them, zeros where none has."""
+    return next((row.intrinsics for row in rows if row.intrinsics is not None), (0.0, 0.0, 0.0, 0.0))
 
 
 def _row(fields: dict[str, str], index: int, where: str) -> Odometry | None:

@@ -26,7 +26,13 @@ from scenewright.stages.ingest.folders.phone_frames import (
     size_words,
 )
 from scenewright.stages.ingest.folders.video_frames import VideoFrames
-from scenewright.stages.ingest.layouts.stray_scanner.odometry import Odometry, read_camera_matrix, read_odometry
+from scenewright.stages.ingest.layouts.stray_scanner.odometry import (
+    Odometry,
+    has_intrinsics,
+    read_camera_matrix,
+    read_odometry,
+    usual_intrinsics,
+)
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import FrameFiles, LogSource, StreamInfo
 
@@ -37,16 +43,18 @@ RECORDED: Size = (1920, 1440)
 
 def matches(root: Path) -> str | None:
     """Return the rule that matched, or None."""
-    if (root / ODOMETRY).is_file() and (root / MATRIX).is_file():
+    if not (root / ODOMETRY).is_file():
+        return None
+    if (root / MATRIX).is_file():
         return f"folder with {ODOMETRY} and {MATRIX}: Stray Scanner"
-    return None
+    return f"folder with {ODOMETRY} that states intrinsics: Stray Scanner" if has_intrinsics(root / ODOMETRY) else None
 
 
 def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSource:
     """List the frames of a recording. Raises BadInput for a video that cannot be opened, a damaged table, or intrinsics
     of other pictures."""
     rows, damage = read_odometry(root / ODOMETRY)
-    matrix = read_camera_matrix(root / MATRIX)
+    matrix = read_camera_matrix(root / MATRIX) if (root / MATRIX).is_file() else usual_intrinsics(rows)
     depths, levels = _numbered(root / "depth", (".png", ".npy")), _numbered(root / "confidence", (".png",))
     video = _video(root / VIDEO)
     try:
@@ -56,8 +64,9 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if full_size is None and all_intrinsics_given(parameters):
             full_size = depth_size or picture_size
         if full_size is None:
+            source = MATRIX if (root / MATRIX).is_file() else ODOMETRY
             raise BadInput(
-                f"{root / MATRIX}: centre {matrix[2]:g}, {matrix[3]:g} is not that of pictures of "
+                f"{root / source}: centre {matrix[2]:g}, {matrix[3]:g} is not that of pictures of "
                 f"{size_words(picture_size or RECORDED)} pixels",
                 hint="give --fx --fy --cx --cy of the depth, or put the app's own camera_matrix.csv there",
             )
@@ -114,7 +123,7 @@ def _frames(
     depths: dict[int, Path],
     levels: dict[int, Path],
     video: VideoFrames | None,
-    matrix: tuple[float, float, float, float],
+    matrix: tuple[float, ...],
     parameters: IngestParameters,
 ) -> list[PhoneFrame]:
     """Return a frame for every number that the table, the depth or the video has."""
