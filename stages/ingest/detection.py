@@ -10,7 +10,13 @@ from typing import NamedTuple
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import OF_TOPICS
 from scenewright.stages.ingest.eye_order import settled_eyes
-from scenewright.stages.ingest.foreign import SHOWN, meant_to_be_read, refuse_foreign_file, refuse_lone_recording
+from scenewright.stages.ingest.foreign import (
+    BY_ENDING,
+    SHOWN,
+    meant_to_be_read,
+    refuse_foreign_file,
+    refuse_lone_recording,
+)
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.registry import LogLayout, all_layouts
 from scenewright.stages.ingest.source import LogSource
@@ -77,7 +83,8 @@ def refuse_logs_within(root: Path) -> None:
         return
     readers = [log_format(layout) for layout in all_layouts() if layout.name != OF_ANY_IMAGES]
     entries = sorted(entry for entry in root.iterdir() if not entry.name.startswith("."))[:MOST_LOOKED_AT]
-    logs = [entry.name for entry in entries if any(reader.matches(entry) for reader in readers)]
+    own = [entry for entry in entries if entry.suffix.lower() not in BY_ENDING]
+    logs = [entry.name for entry in own if any(reader.matches(entry) for reader in readers)]
     if not logs:
         return
     listed = ", ".join(logs[:SHOWN]) + (", ..." if len(logs) > SHOWN else "")

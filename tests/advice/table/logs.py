@@ -13,6 +13,7 @@ from tests.advice.rows import NotTried, Tried
 from tests.advice.table.fuse import scan
 from tests.unit.ingest.calibrations import CAMODOCAL
 from tests.unit.ingest.folder_writers import stamp_text, tum_line, write_image_folder, write_nerfstudio, write_tum
+from tests.unit.ingest.phone_writers import Take, write_stray_scanner
 from tests.unit.ingest.tiny_room import CAMERA, frames, png
 
 GIVEN = "--fx 80 --fy 80 --cx 47.5 --cy 35.5"
@@ -61,6 +62,12 @@ def images(folder: Path) -> None:
     write_image_folder(folder / "log", frames(2), poses=False)
     lines = [tum_line(f"{k / 30:.9f}", pose) for k, (_, _, pose) in enumerate(frames(2))]
     (folder / "mine.tum").write_text("\n".join(lines) + "\n")
+
+
+def odd_stray(folder: Path) -> None:
+    """A recording without its video, of pictures that are not ARKit's usual ones."""
+    log = write_stray_scanner(folder / "log", Take(3), intrinsics=False)
+    (log / "rgb.mp4").unlink()
 
 
 def room_scan(folder: Path) -> None:
@@ -144,15 +151,18 @@ ROWS = [
     *(
         NotTried(FOREIGN, says, ANOTHER)
         for says in (
-            *("azure_kinect_mkv_reader", "export it as EXR", "rtabmap-export --images", "export_svo.py"),
-            *(
-                "export the scan as PLY",
-                "ns-process-data aria",
-                "create_rosbag.py",
-                "record3d --data {}",
-                "polycam --data",
-            ),
+            *("azure_kinect_mkv_reader", "rtabmap-export --images", "export_svo.py"),
+            *("export the scan as PLY", "ns-process-data aria"),
         )
+    ),
+    Tried(
+        "stages/ingest/layouts/stray_scanner/reader.py",
+        "of the depth, or put the app's own",
+        LOG,
+        f"{LOG} --fx 42.7 --fy 42.8 --cx 32.1 --cy 23.2",
+        code=3,
+        given=odd_stray,
+        right=all_are_posed,
     ),
     Tried(
         "stages/ingest/own_poses.py",

@@ -138,15 +138,22 @@ def record3d_metadata(take: Take, **changes: object) -> str:
     return json.dumps({key: value for key, value in {**document, **changes}.items() if value is not None})
 
 
+def write_record3d_pictures(root: Path, take: Take, **changes: object) -> Path:
+    """Write the export as EXR and JPG without its depth."""
+    (root / "rgb").mkdir(parents=True)
+    (root / "metadata.json").write_text(record3d_metadata(take, **changes))
+    for index in range(take.count):
+        (root / "rgb" / f"{index}.jpg").write_bytes(jpeg(take.pictures[index]))
+    return root
+
+
 def write_record3d_export(root: Path, take: Take, **changes: object) -> Path:
     """Write the export as EXR and JPG."""
     library = pytest.importorskip("OpenEXR", reason="the extra `phone` is not installed")
-    for name in ("rgb", "depth"):
-        (root / name).mkdir(parents=True)
-    (root / "metadata.json").write_text(record3d_metadata(take, **changes))
+    write_record3d_pictures(root, take, **changes)
+    (root / "depth").mkdir()
     header = {"compression": library.ZIP_COMPRESSION, "type": library.scanlineimage}
     for index in range(take.count):
-        (root / "rgb" / f"{index}.jpg").write_bytes(jpeg(take.pictures[index]))
         with library.File(header, {"R": take.depths[index].astype(np.float32)}) as file:
             file.write(str(root / "depth" / f"{index}.exr"))
     return root
@@ -169,7 +176,9 @@ def write_r3d(path: Path, take: Take, **changes: object) -> Path:
 def unpack_r3d(path: Path, root: Path) -> Path:
     """Unpack an .r3d file into a folder."""
     with zipfile.ZipFile(io.BytesIO(path.read_bytes())) as archive:
-        archive.extractall(root)
+        for name in archive.namelist():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_bytes(archive.read(name))
     return root
 
 
