@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.folders.frame_loading import Size
-from scenewright.stages.ingest.folders.phone_frames import OPENGL_FROM_OPENCV
+from scenewright.stages.ingest.folders.phone_frames import OPENGL_FROM_OPENCV, numbers_of
 from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.formats.trajectories import transform_from_numbers
 
@@ -84,7 +84,7 @@ def read_metadata(document: Any, where: str) -> Metadata:
 def _rows(document: dict[str, Any], key: str, width: int, where: str, *, whole: bool = False) -> tuple[Any, ...]:
     """Return the rows of `width` numbers of a list, nothing where it is missing; `whole` lists are one row."""
     value = document.get(key)
-    rows = [value] if whole else value if value is not None else []
+    rows: Any = [value] if whole else [] if value is None else value
     try:
         numbers = [tuple(float(number) for number in row) for row in rows]
     except (TypeError, ValueError, OverflowError):
@@ -97,9 +97,9 @@ def _rows(document: dict[str, Any], key: str, width: int, where: str, *, whole: 
 
 
 def _size(document: dict[str, Any], width: str, height: str, where: str) -> Size | None:
-    values = document.get(width), document.get(height)
-    if None in values:
+    if document.get(width) is None or document.get(height) is None:
         return None
-    if not all(isinstance(value, int | float) and 1 <= value <= LARGEST_SIZE for value in values):
-        raise BadInput(f"{where}: {width}, {height} = {values!r:.60} are no size")
-    return int(values[0]), int(values[1])  # type: ignore[call-overload]
+    size = numbers_of([document[width], document[height]], 2)
+    if size is None or not all(1 <= value <= LARGEST_SIZE for value in size):
+        raise BadInput(f"{where}: {width}, {height} = {document[width]!r:.20}, {document[height]!r:.20} are no size")
+    return round(size[0]), round(size[1])

@@ -97,16 +97,12 @@ def _log(recording: Recording, metadata: Metadata, parameters: IngestParameters)
             else f"times assumed: frame number / {metadata.rate or parameters.frame_rate:g} per second",
             *_missing_note(len(numbers), len(metadata.poses)),
         ),
-        streams=tuple(
-            StreamInfo(name, role, "files", count=len(files))
-            for name, role, files in (
-                ("pictures", "color", colors),
-                ("depth", "depth", packed or exported),
-                ("confidence", "other", levels),
-            )
-            if files
-        )
-        + (StreamInfo("poses", "pose", "metadata", count=len(metadata.poses)),),
+        streams=(
+            *((StreamInfo("pictures", "color", "files", count=len(colors)),) if colors else ()),
+            *((StreamInfo("depth", "depth", "files", count=len(packed or exported)),) if packed or exported else ()),
+            *((StreamInfo("confidence", "other", "files", count=len(levels)),) if levels else ()),
+            StreamInfo("poses", "pose", "metadata", count=len(metadata.poses)),
+        ),
         missing={} if metadata.tracked or not metadata.poses else {"pose": SELFIE},
         close=recording.close,
     )

@@ -46,7 +46,8 @@ def read_odometry(path: Path) -> tuple[list[Odometry], tuple[str, ...]]:
         )
     if len(set(names) - {""}) < len([name for name in names if name]):
         raise BadInput(f"{path}: its first line names a column twice")
-    rows, damaged = [], []
+    rows: list[Odometry] = []
+    damaged: list[int] = []
     for number, line in enumerate(lines[1:], start=2):
         fields = dict(zip(names, (field.strip() for field in line.split(",")), strict=False))
         row = _row(fields, len(rows), f"{path}: line {number}")
