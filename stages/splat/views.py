@@ -12,7 +12,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
-from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.cameras import scaled, seen_by
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.own_trajectory import frame_poses
 
@@ -61,16 +61,21 @@ def posed_frames(
 
 
 def read_view(reader: FrameReader, frame: int, world_from_camera: np.ndarray, width: int) -> PosedView | None:
-    """Return a frame at most `width` pixels wide; None without colour, or where it is dark."""
+    """Return a frame at most `width` pixels wide, of its full picture where it has one and is smaller than that; None
+    without colour, or where it is dark."""
     frame_read: Frame = reader.read(frame, ("color", "depth"))
-    if frame_read.color is None or float(frame_read.color.mean()) < 255 * DARK:
+    color, depth = frame_read.color, frame_read.depth
+    if color is None or float(color.mean()) < 255 * DARK:
         return None
     camera = reader.cameras[frame_read.camera_name]
+    picture = reader.read(frame, ("picture",)).picture if width > camera.width else None
+    if picture is not None:
+        full = reader.picture_cameras[frame_read.camera_name]
+        color, depth, camera = picture, None if depth is None else seen_by(depth, camera, full), full
     factor = min(1.0, width / camera.width)
     small = scaled(camera, factor) if factor < 1 else camera
     size = (small.width, small.height)
-    color = frame_read.color if factor == 1 else cv2.resize(frame_read.color, size, interpolation=cv2.INTER_AREA)
-    depth = frame_read.depth
+    color = color if factor == 1 else cv2.resize(color, size, interpolation=cv2.INTER_AREA)
     if depth is not None and factor < 1:
         depth = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)
     pose = inverse(world_from_camera)

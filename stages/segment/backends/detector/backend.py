@@ -10,6 +10,7 @@ from scenewright.schemas.sequence import SequenceFile
 from scenewright.schemas.vocabulary import UNNAMED, SemanticClass, Vocabulary, load_vocabulary
 from scenewright.stages.kit.class_extents import extent_of, is_plausible
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.geometry.cameras import boxes_seen_by
 from scenewright.stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
 from scenewright.stages.segment.backends.detector.box_masks import box_mask, frame_geometry
 from scenewright.stages.segment.backends.detector.room import Room, SurfaceSample, find_room, room_masks, sample_surface
@@ -41,7 +42,7 @@ class DetectorBackend:
     """
 
     name = "detector"
-    streams: tuple[str, ...] = ("color", "depth")
+    streams: tuple[str, ...] = ("color", "depth", "picture")
 
     def __init__(
         self,
@@ -67,7 +68,7 @@ class DetectorBackend:
             for number, label in (witness.labels if witness else {}).items()
             if label.class_name
         }
-        self._detector = detector
+        self._detector, self._reader = detector, reader
         self._classes = [vocabulary.by_alias(name, "coco") for name in COCO_NAMES]
         self._anything = vocabulary.by_name(UNNAMED)
         self._layout = {name: vocabulary.by_name(name) for name in ("floor", "wall", "ceiling")}
@@ -91,9 +92,9 @@ class DetectorBackend:
         geometry = frame_geometry(
             geometric.labels, geometric.points, geometric.normals, available, frame.world_from_camera
         )
-        detections: Detections = self._detector.detect(frame.color)
+        detections, boxes = self._detected(frame)
         things = []
-        for box, score, number in zip(detections.boxes, detections.scores, detections.classes, strict=True):
+        for box, score, number in zip(boxes, detections.scores, detections.classes, strict=True):
             semantic = self._classes[int(number)]
             if semantic is None:
                 continue
@@ -114,6 +115,17 @@ class DetectorBackend:
             classes = self._witness.classify(frame.color)
             things = list(witnessed(things, classes, self._known, threshold=self._threshold, anything=self._anything))
         return merge_duplicates(things)
+
+    def _detected(self, frame: Frame) -> tuple[Detections, np.ndarray]:
+        """Return what is found in a frame's picture, in its colour where it has none, and the boxes (N, 4) in the
+        frame."""
+        if frame.picture is None:
+            assert frame.color is not None
+            found = self._detector.detect(frame.color)
+            return found, found.boxes
+        found = self._detector.detect(frame.picture)
+        picture, camera = self._reader.picture_cameras[frame.camera_name], self._reader.cameras[frame.camera_name]
+        return found, boxes_seen_by(found.boxes, picture, camera)
 
 
 def _surface_samples(reader: FrameReader, settings: GeometricSettings) -> Iterator[SurfaceSample]:
@@ -182,11 +194,12 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
         witness = open_segmenter(request.semantic_weights, device=request.device)
         score_threshold = HEARD * parameters.score_threshold
         label = f"detector {request.weights.stem}, witnessed by {request.semantic_weights.stem}, + geometric segments"
+    seen = next(iter(reader.picture_cameras.values()), reader.camera)
     detector = Detector(
         request.weights,
         score_threshold=score_threshold,
         suppression_overlap=parameters.suppression_overlap,
-        tile_side=min(reader.camera.width, reader.camera.height) if parameters.tiles is None else 0,
+        tile_side=min(seen.width, seen.height) if parameters.tiles is None else 0,
         tiles=parameters.tiles or 0,
     )
     return DetectorBackend(

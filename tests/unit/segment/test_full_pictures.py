@@ -1,0 +1,93 @@
+"""Where a sequence keeps pictures larger than its frames, networks see those; masks come out at the frame's size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.frames import Frame, FrameReader, FrameWriter
+from scenewright.stages.kit.geometry.cameras import boxes_seen_by, project, scaled, seen_by
+from scenewright.stages.segment.full_pictures import OnFullPictures
+from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.splat.views import read_view
+
+SMALL = Camera(width=32, height=24, fx=30.0, fy=30.0, cx=15.8, cy=11.6)
+FULL = scaled(SMALL, 7.5)
+
+
+class Bright:
+    """A backend of pictures: what is bright is one mask, a dot of one pixel another."""
+
+    name, label, networks = "bright", "bright", ("bright",)
+    streams: tuple[str, ...] = ("color", "depth")
+
+    def __call__(self, frame: Frame, geometric: GeometricFrame | None, random: object) -> PanopticFrame:
+        assert frame.color is not None
+        ids = (frame.color[..., 0] > 128).astype(np.int32)
+        ids[0, 1] = 2
+        return PanopticFrame(ids, {1: PanopticMask(5, True, 0.9), 2: PanopticMask(6, True, 0.9)})
+
+
+def written(path: Path, picture: np.ndarray | None) -> FrameReader:
+    pictures = {"camera": FULL}
+    with FrameWriter(path, SMALL, picture_cameras=pictures) as writer:
+        writer.write(1.0, np.zeros((24, 32, 3), np.uint8), np.ones((24, 32), np.float32), picture=picture)
+    return FrameReader(path)
+
+
+def test_masks_of_the_picture_come_out_at_the_frames_size(tmp_path: Path) -> None:
+    picture = np.zeros((180, 240, 3), np.uint8)
+    picture[60:120, 80:160] = 255
+    with written(tmp_path / "frames.mcap", picture) as reader:
+        backend = OnFullPictures(Bright(), reader)
+        assert backend.networks == ("bright",) and "picture" in backend.streams
+        (frame,) = reader.frames(backend.streams)
+        found = backend(frame, None, np.random.default_rng(0))  # type: ignore[arg-type]
+    assert found.ids.shape == (24, 32) and set(found.masks) == {1}
+    rows, columns = np.nonzero(found.ids == 1)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (8, 15, 11, 20)
+
+
+def test_a_frame_without_a_picture_is_judged_by_its_colour(tmp_path: Path) -> None:
+    with written(tmp_path / "frames.mcap", None) as reader:
+        (frame,) = reader.frames(("color", "depth", "picture"))
+        found = OnFullPictures(Bright(), reader)(frame, None, np.random.default_rng(0))  # type: ignore[arg-type]
+    assert found.ids.shape == (24, 32) and not (found.ids == 1).any()
+
+
+@pytest.mark.parametrize("source", [FULL, FULL.model_copy(update={"cx": 140.0, "fy": 260.0})])
+def test_a_ray_is_the_same_pixel_of_both(source: Camera) -> None:
+    image = np.arange(source.width * source.height).reshape(source.height, source.width)
+    seen = seen_by(image, source, SMALL)
+    points = np.array([[0.1, -0.2, 1.0], [-0.3, 0.1, 1.2], [0.0, 0.0, 2.0]])
+    (small, _), (large, _) = project(points, SMALL), project(points, source)
+    for (u, v), (x, y) in zip(np.rint(small).astype(int), large, strict=True):
+        row, column = np.divmod(seen[v, u], source.width)
+        assert abs(row - y) < 8 and abs(column - x) < 8
+    boxes = np.hstack([large, large + 10])
+    assert boxes_seen_by(boxes, source, SMALL)[:, :2] == pytest.approx(small)
+
+
+def test_what_the_other_did_not_see_is_nothing() -> None:
+    narrow = SMALL.model_copy(update={"fx": 60.0, "fy": 60.0})
+    seen = seen_by(np.ones((24, 32), np.int32), narrow, SMALL)
+    assert seen.shape == (24, 32) and seen[12, 16] == 1 and not seen[0].any() and not seen[:, 0].any()
+
+
+@pytest.mark.parametrize(("width", "size"), [(20, (20, 15)), (120, (120, 90)), (1000, (240, 180))])
+def test_splats_are_learned_from_the_picture_where_frames_are_smaller(
+    tmp_path: Path, width: int, size: tuple[int, int]
+) -> None:
+    with FrameWriter(tmp_path / "frames.mcap", SMALL, picture_cameras={"camera": FULL}) as writer:
+        color, depth = np.full((24, 32, 3), 80, np.uint8), np.ones((24, 32), np.float32)
+        writer.write(1.0, color, depth, picture=np.full((180, 240, 3), 200, np.uint8))
+    with FrameReader(tmp_path / "frames.mcap") as reader:
+        view = read_view(reader, 0, np.eye(4), width)
+    assert view is not None and view.depth is not None and view.color.shape[:2] == view.depth.shape
+    assert (view.camera.width, view.camera.height) == size
+    assert view.camera.fx == pytest.approx(SMALL.fx * size[0] / 32)
+    assert view.color.mean() == pytest.approx((80 if width == 20 else 200) / 255, abs=0.02)
+    assert (view.depth > 0).all()
