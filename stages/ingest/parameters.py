@@ -53,6 +53,9 @@ class IngestParameters(Parameters):
         description="Resample the colour of 7-Scenes Kinect logs (640x480, focal length 585) into the depth camera, "
         "from which it was recorded 3 cm apart",
     )
+    turn: bool = Field(
+        True, description="Turn recordings of phones whose pictures lie on their side, where the log says what is up"
+    )
     gravity: Literal["auto", "given", "floor", "imu", "camera-up", "none"] = Field(
         "auto",
         description="How the world is made upright: auto takes what the log says, else the floor, else what an IMU "

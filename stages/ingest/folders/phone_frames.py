@@ -23,6 +23,13 @@ from scenewright.stages.ingest.folders.frame_loading import (
     loader_of,
     picture_camera,
 )
+from scenewright.stages.ingest.folders.quarter_turns import (
+    WORDS,
+    quarters_to_upright,
+    turned_camera,
+    turned_loader,
+    turned_pose,
+)
 from scenewright.stages.ingest.folders.undistortion import RecordedCamera, overridden_recording
 from scenewright.stages.ingest.images import decode_image, same_shape
 from scenewright.stages.ingest.parameters import IngestParameters
@@ -86,31 +93,37 @@ def phone_source(name: str, rule: str, log: PhoneLog, parameters: IngestParamete
     camera = cameras[0] if len(set(cameras)) == 1 else median_camera(cameras)
     form, unit_note = depth_form(parameters, log.units_per_metre)
     kept = larger(log.picture_size, size)
+    turns = _quarters(log) if parameters.turn else 0
     entries = tuple(
         Entry(
             frame.name,
             frame.time,
-            frame.pose,
-            loader_of(frame.reads, FrameFormat(own, camera, has_color, has_depth, form, kept)),
+            turned_pose(frame.pose, turns),
+            turned_loader(load, turns) if turns else load,
             frame.problem or _absence(frame.reads, has_color, has_depth),
             files=frame.files,
             stamp=frame.stamp,
         )
         for frame, own in zip(log.frames, recorded, strict=True)
+        for load in (loader_of(frame.reads, FrameFormat(own, camera, has_color, has_depth, form, kept)),)
     )
     notes = [*log.notes, *_intrinsics_notes(parameters, recorded[0])]
     if len(set(cameras)) > 1:
         notes.append(f"{len(set(cameras))} different intrinsics: images are resampled to the median ones")
     if kept is not None:
         notes.append(f"colour brought to the depth's {size_words(size)}; pictures of {size_words(kept)} are kept")
+    if turns:
+        notes.append(f"pictures and depth turned {WORDS[turns]}, so that they stand upright (--no-turn leaves them)")
     with_levels = sum(frame.reads.levels is not None for frame in log.frames)
     if has_depth:
         notes.append(unit_note)
         notes.append(_levels_note(with_levels, len(log.frames)))
+    picture = picture_camera(camera, kept)
+    full = None if picture is None else turned_camera(picture, turns)
     return LogSource(
         name,
         rule,
-        (SourceCamera("camera", camera, picture=picture_camera(camera, kept)),),
+        (SourceCamera("camera", turned_camera(camera, turns), picture=full),),
         entries,
         tuple(notes),
         up_in_log=log.up_in_log,
@@ -169,6 +182,12 @@ def full_picture_size(intrinsics: Sequence[float], candidates: Sequence[Size | N
 def size_words(size: Size | None) -> str:
     """Return a size for people."""
     return "no size" if size is None else f"{size[0]}x{size[1]}"
+
+
+def _quarters(log: PhoneLog) -> int:
+    if log.up_in_log is None:
+        return 0
+    return quarters_to_upright([frame.pose for frame in log.frames if frame.pose is not None], log.up_in_log)
 
 
 def _recorded(

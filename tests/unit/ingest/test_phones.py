@@ -13,16 +13,18 @@ from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.confidence_levels import deviation_of_levels
 from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.folders.quarter_turns import quarters_to_upright, turned_camera, turned_pose
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.kit.formats.foxglove import decode_color
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.cameras import back_project, project
-from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
 
 from tests.real_data import real_data
 from tests.unit.ingest.folder_writers import write_colmap, write_nerfstudio, write_scannet
 from tests.unit.ingest.loading import loaded_frames
 from tests.unit.ingest.phone_writers import (
+    ARKIT_FROM_ROOM,
     DEPTH,
     FULL,
     Take,
@@ -37,7 +39,7 @@ from tests.unit.ingest.phone_writers import (
     write_stray_scanner,
 )
 from tests.unit.ingest.running import ingest
-from tests.unit.ingest.tiny_room import CAMERA, frames
+from tests.unit.ingest.tiny_room import CAMERA, frames, room_depth
 
 WRITERS: dict[str, tuple[str, Callable[[Path, Take], Path]]] = {
     "stray": ("stray-scanner", lambda root, take: write_stray_scanner(root, take)),
@@ -252,6 +254,50 @@ def test_upright_phones_give_upright_pictures_as_the_app_turns_all_of_them(tmp_p
         )
         pixel, _ = project(apply(inverse(plain.world_from_camera[index]), points), DEPTH)
         assert pixel[0] == pytest.approx([20, 48 - 1 - 30], abs=0.02)
+
+
+def held_upright(take: Take) -> Take:
+    """The phone turned: the sensor's pictures lie on their side, their x axis looks down."""
+    turned = Take(take.count)
+    sensor_from_upright = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    turned.world_from_camera = take.world_from_camera @ inverse(sensor_from_upright)
+    turned.depths = [room_depth(DEPTH, pose) for pose in inverse(ARKIT_FROM_ROOM) @ turned.world_from_camera]
+    return turned
+
+
+@pytest.mark.parametrize("write", [write_stray_scanner, write_polycam])
+def test_a_phone_held_upright_gives_upright_frames(tmp_path: Path, take: Take, write: Callable) -> None:
+    """What the app shows upright is stored on its side: pictures, depth, confidence, intrinsics and poses are turned
+    alike, so that a ray of the upright camera meets the room where it is."""
+    sideways = held_upright(take)
+    source, frames = loaded_frames(write(tmp_path / "log", sideways))
+    assert (source.camera.width, source.camera.height) == (DEPTH.height, DEPTH.width)
+    assert source.cameras[0].picture is not None and source.cameras[0].picture.width == FULL.height
+    assert any("turned a quarter clockwise, so that they stand upright" in note for note in source.notes)
+    for index, (entry, frame) in enumerate(zip(source.entries, frames, strict=True)):
+        assert np.abs(entry.world_from_camera - take.world_from_camera[index]).max() < 1e-6
+        expected = room_depth(source.camera, inverse(ARKIT_FROM_ROOM) @ entry.world_from_camera)
+        assert np.abs(frame.depth / 1000 - expected).max() < 1.1e-3
+        levels = np.rot90(sideways.levels[index], -1)
+        assert frame.deviation == pytest.approx(deviation_of_levels(levels, frame.depth.astype(np.float32) / 1000))
+        found = frame.picture if isinstance(frame.picture, np.ndarray) else _decoded(frame.picture)
+        assert np.abs(found.astype(int) - np.rot90(sideways.pictures[index], -1)).mean() < 6
+    left, _ = loaded_frames(tmp_path / "log", turn=False)
+    assert (left.camera.width, left.camera.height) == (DEPTH.width, DEPTH.height)
+    assert np.abs(left.entries[0].world_from_camera - sideways.world_from_camera[0]).max() < 1e-6
+
+
+@pytest.mark.parametrize("quarters", range(4))
+def test_how_far_pictures_are_turned(quarters: int) -> None:
+    """However the phone is held, up comes out up; one that looks at the floor is left as it is."""
+    level = look_at(np.array([0, 0, 1.0]), np.array([2.0, 1, 0.8]))
+    held = turned_pose(level, -quarters % 4)
+    assert held is not None and quarters_to_upright([held], np.array([0, 0, 1.0])) == quarters
+    camera = turned_camera(turned_camera(FULL, quarters), (4 - quarters) % 4)
+    assert camera == FULL
+    down = look_at(np.array([0, 0, 2.0]), np.array([0.05, 0, 0.0]), up=(0, 1, 0))
+    turned = turned_pose(down, quarters)
+    assert turned is not None and quarters_to_upright([turned], np.array([0, 0, 1.0])) == 0
 
 
 def test_the_selfie_camera_has_no_poses(tmp_path: Path, take: Take) -> None:
