@@ -33,7 +33,11 @@ AZURE_KINECT = Foreign(
     "an Azure Kinect recording",
     f"take its images out with Open3D: python azure_kinect_mkv_reader.py --input {{}} --output OUT{THEN}",
 )
-VIDEO = Foreign("a video", "put it into a folder of its own with a calibration file (docs/LOGS.md), and give that")
+VIDEO = Foreign(
+    "a video",
+    "it holds no depth: docs/PHONE.md says what comes of one; that of a stereo camera is read from a folder of its own "
+    "with its calibration file (docs/LOGS.md)",
+)
 RTABMAP = Foreign(
     "an RTAB-Map database",
     "write its images with rtabmap-export --images {} and its poses with rtabmap-export --poses_camera "
@@ -57,7 +61,7 @@ BY_ENDING = {
     ".klg": Foreign(
         "a log of Kintinuous or ElasticFusion", "write its colour and 16-bit depth as PNG into color/ and depth/"
     ),
-    ".usdz": Foreign("a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh"),
+    ".usdz": Foreign("a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh, or its raw data"),
     ".vrs": Foreign(
         "a Project Aria recording", f"ns-process-data aria --vrs-file {{}} --output-dir OUT (nerfstudio){THEN}"
     ),

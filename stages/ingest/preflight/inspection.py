@@ -443,6 +443,8 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
 
     if "depth" not in streams and not stereo:
         advice = "record depth; colour alone can only be looked at"
+        if "pose" in streams and "color" in streams:
+            advice = "record depth; of pictures with poses a splat can be learned: ingest, then scenewright splat build"
         add("wasted", "depth", f"there is no depth and no stereo pair with a baseline{why('depth')}", advice)
     elif "depth" not in streams:
         add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")

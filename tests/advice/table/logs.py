@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.sequence import Sequence
+from scenewright.stages.ingest.folders.quarter_turns import OLD_FROM_TURNED
 from scenewright.stages.kit.formats.frames import FrameReader
 
 from tests.advice.rows import NotTried, Tried
@@ -70,6 +71,13 @@ def odd_stray(folder: Path) -> None:
     (log / "rgb.mp4").unlink()
 
 
+def upright_phone(folder: Path) -> None:
+    """A recording of a phone that was held upright: its pictures lie on their side."""
+    take = Take(3)
+    take.world_from_camera = take.world_from_camera @ OLD_FROM_TURNED.T
+    write_stray_scanner(folder / "log", take)
+
+
 def room_scan(folder: Path) -> None:
     for ending in ("ply", "obj"):
         scan(f"scan.{ending}")(folder)
@@ -94,6 +102,11 @@ def all_are_posed(folder: Path) -> None:
     with FrameReader(folder / "out/frames.mcap") as reader:
         poses = [frame.world_from_camera for frame in reader.frames(streams=())]
     assert info.frame_count == info.frames_in_log and all(pose is not None for pose in poses)
+
+
+def sizes(folder: Path, size: tuple[int, int]) -> None:
+    camera = Sequence(folder / "out").info.camera
+    assert (camera.width, camera.height) == size
 
 
 def refused(path: str, says: str, given, code: int = 3) -> Tried:  # type: ignore[no-untyped-def]
@@ -163,6 +176,15 @@ ROWS = [
         code=3,
         given=odd_stray,
         right=all_are_posed,
+    ),
+    Tried(
+        "stages/ingest/folders/phone_frames.py",
+        "--no-turn leaves them",
+        LOG,
+        f"{LOG} --no-turn --force",
+        code=0,
+        given=upright_phone,
+        right=lambda folder: sizes(folder, (64, 48)),
     ),
     Tried(
         "stages/ingest/own_poses.py",
