@@ -61,7 +61,9 @@ BY_ENDING = {
     ".klg": Foreign(
         "a log of Kintinuous or ElasticFusion", "write its colour and 16-bit depth as PNG into color/ and depth/"
     ),
-    ".usdz": Foreign("a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh, or its raw data"),
+    ".usdz": Foreign(
+        "a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh, or its raw data"
+    ),
     ".vrs": Foreign(
         "a Project Aria recording", f"ns-process-data aria --vrs-file {{}} --output-dir OUT (nerfstudio){THEN}"
     ),

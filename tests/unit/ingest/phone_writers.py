@@ -1,6 +1,6 @@
 """Recordings of the tiny room as the apps of phones write them, from what their makers publish of the form.
 
-Stray Scanner: the page on the format of strayrobots/scanner, and OdometryEncoder.swift. Record3D: marek-simonik/record3d,
+Stray Scanner: the page on the format of strayrobots/scanner, OdometryEncoder.swift. Record3D: marek-simonik/record3d,
 issues 7, 27, 36 and 93. Polycam: PolyCam/polyform, README. 3D Scanner App: its JSON files, as public scripts read them.
 ARKitScenes: apple/ARKitScenes, tenFpsDataLoader.py. ScanNet++: scannetpp/scannetpp, iphone/. NeRFCapture:
 jc211/NeRFCapture, DatasetWriter.swift. No reader of ours is used.

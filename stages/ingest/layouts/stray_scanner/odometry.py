@@ -1,4 +1,4 @@
-"""Stray Scanner's odometry.csv and camera_matrix.csv, as its app writes them (strayrobots/scanner, its page on the format).
+"""Stray Scanner's odometry.csv and camera_matrix.csv, as its app writes them (strayrobots/scanner, page on the format).
 
 The first line names the columns. Recent versions add intrinsics of each picture; the first ones had neither time nor
 frame. Poses are world_from_camera with OpenCV axes: the app turns ARKit's about x (OdometryEncoder.swift).
