@@ -17,6 +17,7 @@ from scenewright.stages.fuse.association import (
     overlapping_labels,
 )
 from scenewright.stages.fuse.free_space import FreeSpace
+from scenewright.stages.fuse.hits import sure_depth
 from scenewright.stages.fuse.integration import integrate
 from scenewright.stages.fuse.merging import Merging, SharedSegment
 from scenewright.stages.fuse.parameters import FuseParameters
@@ -67,8 +68,10 @@ class PanopticMapper:
         world_from_camera: np.ndarray,
         ids: np.ndarray | None = None,
         listing: Sequence[FrameSegment] = (),
+        deviation: np.ndarray | None = None,
     ) -> None:
-        """Fuse one frame: depth (H, W) float32 [m], colour (H, W, 3) uint8 or None, world_from_camera (4, 4).
+        """Fuse one frame: depth (H, W) float32 [m], colour (H, W, 3) uint8 or None, world_from_camera (4, 4), deviation
+        of depth (H, W) float32 [m] (0: unknown) or None.
 
         ids (H, W) int32: the frame's panoptic image, whose values `listing` explains; None fuses geometry alone. Raises
         BadInput for images of different sizes, for an id that is not listed, and for a camera too far from the origin
@@ -76,7 +79,7 @@ class PanopticMapper:
         """
         options = self.parameters
         expected = (camera.height, camera.width)
-        for name, image in (("depth", depth), ("colour", color), ("segments", ids)):
+        for name, image in (("depth", depth), ("colour", color), ("segments", ids), ("deviation", deviation)):
             if image is not None and image.shape[:2] != expected:
                 raise BadInput(
                     f"{name} of the frame is {image.shape[1]}x{image.shape[0]}, the camera {expected[1]}x{expected[0]}",
@@ -89,8 +92,11 @@ class PanopticMapper:
                 hint="move the origin of the trajectory near the scene",
             )
         index_image, frame_labels = None, np.zeros(1, dtype=np.int32)
+        sure = sure_depth(depth, deviation)
         if ids is not None:
-            index_image, frame_labels = self._associate(camera, depth, world_from_camera, ids, listing)
+            index_image, frame_labels = self._associate(camera, sure, world_from_camera, ids, listing)
+            if deviation is not None:
+                index_image[sure == 0] = 0
         integrate(
             self.blocks,
             depth,
@@ -99,6 +105,7 @@ class PanopticMapper:
             truncation=self.truncation_distance,
             near=options.minimum_depth,
             far=options.maximum_depth,
+            deviation=deviation,
             color=color,
             index_image=index_image,
             label_of_index=frame_labels,
@@ -108,7 +115,7 @@ class PanopticMapper:
             stride=options.block_stride,
         )
         if self.free_space is not None:
-            self.free_space.add_frame(camera, depth, world_from_camera, options.maximum_depth)
+            self.free_space.add_frame(camera, sure, world_from_camera, options.maximum_depth)
         self.cameras.append(np.array(world_from_camera[:3, 3], float))
         self.frames_integrated += 1
         if self.frames_integrated % options.regularize_every == 0:
