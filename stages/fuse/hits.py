@@ -16,7 +16,7 @@ TILE = 4
 STEEP = 2.0
 """A tile is steep where its depth changes by more than this many times its width: seen at less than 27 degrees."""
 LARGEST_DEVIATION = 0.08
-"""Depth of a larger standard deviation is no evidence of where a surface is, what is before it or whose it is [m]."""
+"""Depth of a larger standard deviation tells not in which cell its point is [m]."""
 MOST_HITS = 255
 """Largest count of a voxel: it has 8 bits."""
 

@@ -17,7 +17,6 @@ from scenewright.stages.fuse.association import (
     overlapping_labels,
 )
 from scenewright.stages.fuse.free_space import FreeSpace
-from scenewright.stages.fuse.hits import sure_depth
 from scenewright.stages.fuse.integration import integrate
 from scenewright.stages.fuse.merging import Merging, SharedSegment
 from scenewright.stages.fuse.parameters import FuseParameters
@@ -92,11 +91,8 @@ class PanopticMapper:
                 hint="move the origin of the trajectory near the scene",
             )
         index_image, frame_labels = None, np.zeros(1, dtype=np.int32)
-        sure = sure_depth(depth, deviation)
         if ids is not None:
-            index_image, frame_labels = self._associate(camera, sure, world_from_camera, ids, listing)
-            if deviation is not None:
-                index_image[sure == 0] = 0
+            index_image, frame_labels = self._associate(camera, depth, world_from_camera, ids, listing)
         integrate(
             self.blocks,
             depth,
@@ -115,7 +111,7 @@ class PanopticMapper:
             stride=options.block_stride,
         )
         if self.free_space is not None:
-            self.free_space.add_frame(camera, sure, world_from_camera, options.maximum_depth)
+            self.free_space.add_frame(camera, depth, world_from_camera, options.maximum_depth)
         self.cameras.append(np.array(world_from_camera[:3, 3], float))
         self.frames_integrated += 1
         if self.frames_integrated % options.regularize_every == 0:
