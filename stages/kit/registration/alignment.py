@@ -1,9 +1,9 @@
 """Dense alignment of two frames: point-to-plane distance and brightness difference together, Gauss-Newton.
 
 The hybrid objective of Park, Zhou and Koltun (Colored point cloud registration revisited, ICCV 2017) with projective
-association (KinectFusion, Newcombe 2011), weights by the sensor's noise at each depth (Nguyen, Izadi and Lovell 2012)
-or by the deviations that both frames state, and gain and bias of the exposure estimated along. One thread adds up in one order, so that the same frames give the
-same bits; Open3D's parallel sums do not.
+association (KinectFusion, Newcombe 2011), weights by the deviations that both frames state, else by the sensor's noise
+at each depth (Nguyen, Izadi and Lovell 2012), and gain and bias of the exposure estimated along. One thread adds up in
+one order, so that the same frames give the same bits; Open3D's parallel sums do not.
 """
 
 from __future__ import annotations
