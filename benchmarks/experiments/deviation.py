@@ -192,7 +192,7 @@ def beside_even(results: Results) -> dict[str, Figure | None]:
 EXPERIMENT = Experiment(
     name="deviation",
     title="Depth from two eyes, weighed by its own deviation",
-    simulated="Generated rooms, two rendered eyes 12 cm apart with noisy pictures. The motorcycle is a real pair.",
+    simulated="Generated rooms, two rendered eyes with noisy pictures. The motorcycle is a real pair.",
     knows="Exact poses and calibration.",
     does_not_show="Real rooms: no real log with deviations and a true surface was at hand, of phones neither. The pair "
     "has measured disparities and no other views, so that nothing is fused of it.",
