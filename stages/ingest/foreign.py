@@ -40,8 +40,9 @@ VIDEO = Foreign(
 )
 RTABMAP = Foreign(
     "an RTAB-Map database",
-    "write its images with rtabmap-export --images {} and its poses with rtabmap-export --poses_camera "
-    "--poses_format 10 {}; give ingest the folder, and the poses as --trajectory",
+    "rtabmap-export --images --poses_camera --poses_format 10 {} writes NAME_rgb, NAME_depth, NAME_calib and "
+    "NAME_camera_poses.txt: put the first two into a folder as rgb and depth, a file of the third as calibration.yaml, "
+    "and ingest it with --trajectory NAME_camera_poses.txt",
 )
 BY_ENDING = {
     ".mkv": VIDEO,

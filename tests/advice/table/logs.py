@@ -164,7 +164,7 @@ ROWS = [
     *(
         NotTried(FOREIGN, says, ANOTHER)
         for says in (
-            *("azure_kinect_mkv_reader", "rtabmap-export --images", "export_svo.py"),
+            *("azure_kinect_mkv_reader", "rtabmap-export --images --poses_camera", "export_svo.py"),
             *("export the scan as PLY", "ns-process-data aria"),
         )
     ),
