@@ -58,7 +58,7 @@ NOT_OPENED = {
     "tableware/realsense_tabletop": "--fx",
     "logs/custom-camera-model.mcap": "--fx",
     "logs/empty-file.bag": "LOGS.md",
-    "logs/rosbag2/reindex_test_bags": "LOGS.md",
+    "logs/rosbag2/reindex_test_bags": "multiple_files",
 }
 """Log -> what its refusal says."""
 LONG = {"7scenes_redkitchen", "redwood_livingroom1", "fox", "surgt_stereo"}
