@@ -6,13 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.formats.frames import Frame, FrameReader, FrameWriter
 from scenewright.stages.kit.geometry.cameras import boxes_seen_by, project, scaled, seen_by
+from scenewright.stages.segment.backends.masks.backend import MasksBackend
+from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.full_pictures import OnFullPictures
-from scenewright.stages.segment.geometric import GeometricFrame
+from scenewright.stages.segment.geometric import GeometricFrame, segment_depth
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
+from scenewright.stages.segment.parameters import SegmentParameters
+from scenewright.stages.segment.settings import geometric_settings
 from scenewright.stages.splat.views import read_view
+
+from tests.unit.ingest.phone_writers import Take, write_polycam
+from tests.unit.ingest.running import ingest
 
 SMALL = Camera(width=32, height=24, fx=30.0, fy=30.0, cx=15.8, cy=11.6)
 FULL = scaled(SMALL, 7.5)
@@ -91,3 +99,29 @@ def test_splats_are_learned_from_the_picture_where_frames_are_smaller(
     assert view.camera.fx == pytest.approx(SMALL.fx * size[0] / 32)
     assert view.color.mean() == pytest.approx((80 if width == 20 else 200) / 255, abs=0.02)
     assert (view.depth > 0).all()
+
+
+@pytest.mark.parametrize("size", [(48, 64), (360, 480)])
+def test_masks_of_ones_own_may_be_of_the_full_picture(tmp_path: Path, size: tuple[int, int]) -> None:
+    """The same mask, made on the frame or on the app's picture, is the same segment; other sizes are refused."""
+    sequence = ingest(write_polycam(tmp_path / "log", Take(2)), tmp_path / "sequence")
+    mask = np.zeros((1, *size), bool)
+    mask[0, size[0] // 4 : size[0] // 2, size[1] // 4 : size[1] // 2] = True
+    (tmp_path / "masks").mkdir()
+    with FrameReader(sequence.path("frames.mcap")) as reader:
+        for time in reader.times:
+            path = tmp_path / "masks" / f"{time:.9f}.npz"
+            np.savez(path, masks=mask, classes=np.array(["cup"]), scores=np.array([0.9], np.float32))
+        request = BackendRequest(
+            SegmentParameters(backend="masks"), None, masks=tmp_path / "masks", sequence=sequence, reader=reader
+        )
+        backend = MasksBackend(request)
+        (frame, _) = reader.frames(("depth",))
+        geometric = segment_depth(frame.depth, reader.camera, geometric_settings(SegmentParameters()))
+        ids = backend(frame, geometric, np.random.default_rng(0)).ids
+        rows, columns = np.nonzero(ids)
+        assert ids.shape == (48, 64)
+        assert (rows.min(), rows.max(), columns.min(), columns.max()) == (12, 23, 16, 31)
+        np.savez(path, masks=mask[:, :-1], classes=np.array(["cup"]), scores=np.array([0.9], np.float32))
+        with pytest.raises(BadInput, match="frame 1"):
+            backend(reader.read(1, ("depth",)), geometric, np.random.default_rng(0))
