@@ -17,6 +17,7 @@ from scenewright.stages.segment.geometric import GeometricFrame, segment_depth
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
 from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.settings import geometric_settings
+from scenewright.stages.splat.language.looks import sight_of
 from scenewright.stages.splat.views import read_view
 
 from tests.unit.ingest.phone_writers import Take, write_polycam
@@ -99,6 +100,18 @@ def test_splats_are_learned_from_the_picture_where_frames_are_smaller(
     assert view.camera.fx == pytest.approx(SMALL.fx * size[0] / 32)
     assert view.color.mean() == pytest.approx((80 if width == 20 else 200) / 255, abs=0.02)
     assert (view.depth > 0).all()
+
+
+def test_words_are_looked_up_in_the_picture(tmp_path: Path) -> None:
+    depth = np.full((24, 32), 2, np.float32)
+    with FrameWriter(tmp_path / "frames.mcap", SMALL, picture_cameras={"camera": FULL}) as writer:
+        writer.write(1.0, np.zeros((24, 32, 3), np.uint8), depth, picture=np.full((180, 240, 3), 200, np.uint8))
+        writer.write(2.0, np.full((24, 32, 3), 9, np.uint8), depth)
+    with FrameReader(tmp_path / "frames.mcap") as reader:
+        full, small = (sight_of(reader, frame, frame.depth, np.eye(4)) for frame in reader.frames(("color", "depth")))
+    assert full.camera == FULL and full.color.shape == (180, 240, 3) and full.color.mean() > 190
+    assert full.depth.shape == (180, 240) and (full.depth == 2).all()
+    assert small.camera == SMALL and small.color.mean() == pytest.approx(9, abs=1)
 
 
 @pytest.mark.parametrize("size", [(48, 64), (360, 480)])
