@@ -74,8 +74,8 @@ def read_view(reader: FrameReader, frame: int, world_from_camera: np.ndarray, wi
 
 
 def sharpest(reader: FrameReader, frame: Frame, width: int) -> tuple[np.ndarray, np.ndarray | None, Camera]:
-    """Return colour (H, W, 3) uint8, depth (H, W) [m] and camera of a frame that has colour, at most `width` wide: of its
-    full picture where it has one and is smaller than that, with depth of the nearest pixel."""
+    """Return colour (H, W, 3) uint8, depth (H, W) [m] and camera of a frame that has colour, at most `width` wide: of
+    its full picture where it has one and is smaller than that, with depth of the nearest pixel."""
     assert frame.color is not None
     color, depth, camera = frame.color, frame.depth, reader.cameras[frame.camera_name]
     picture = reader.read(frame.index, ("picture",)).picture if width > camera.width else None
