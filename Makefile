@@ -327,11 +327,15 @@ come-robot: setup ## A robot told in words (COME-robot): tables 3.2 to 3.4, abla
 	$(if $(PHYSICS),$(EXPERIMENT) come_robot_physics --count $(PHYSICS) --out $(OUTPUTS)/experiments/come-robot-physics $(ASKED) $(if $(PUBLISH),--publish))
 	$(if $(PUBLISH),$(PYTHON) -m benchmarks.figures)
 
-.PHONY: bench-disparity bench-reconstruct-stereo train-stereo
+.PHONY: bench-disparity bench-deviation bench-reconstruct-stereo train-stereo
 # Rendered pairs are kept below the output folder; the network's arms run when its checkpoint is there.
 STEREO_NETWORK ?= data/disparity/raft_stereo_small.safetensors
 bench-disparity: setup ## Disparity beside OpenCV's matchers: Middlebury, endoscope, rooms, needles (QUICK=1: fewer frames; REAL_DATA=folder)
 	OMP_NUM_THREADS=1 $(EXPERIMENT) disparity --data $(REAL_DATA) $(if $(wildcard $(STEREO_NETWORK)),--network $(STEREO_NETWORK)) --out $(OUTPUTS)/experiments/bench-disparity$(if $(QUICK),-quick) $(ASKED)
+
+# Eight generated rooms, a minute and a half each on one core.
+bench-deviation: setup ## Maps of two eyes with depth weighed by its deviation, and whether that is true (QUICK=1: one room)
+	OMP_NUM_THREADS=1 $(EXPERIMENT) deviation --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-deviation$(if $(QUICK),-quick) $(ASKED)
 
 bench-reconstruct-stereo: setup ## Rooms reconstructed from two eyes beside a depth camera, a reporting seed (QUICK=1: few small frames)
 	$(EXPERIMENT) stereo_rooms --out $(OUTPUTS)/experiments/bench-reconstruct-stereo$(if $(QUICK),-quick) $(ASKED)

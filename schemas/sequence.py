@@ -10,8 +10,8 @@ from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
 from scenewright.schemas.base import Count, Model, Transform
 from scenewright.schemas.scene_parts import Camera
 
-StreamName = Literal["color", "depth", "right", "labels", "pose", "confidence", "picture"]
-"""What a frame may have: `confidence` says how far depth is to be believed, `picture` is colour at its full size."""
+StreamName = Literal["color", "depth", "right", "labels", "pose", "deviation", "picture"]
+"""What a frame may have: `deviation` is the standard deviation of depth, `picture` is colour at its full size."""
 
 
 class Gravity(Model):

@@ -19,6 +19,9 @@ TEXTURE_HALF = 0.6
 """Change along the row [grey levels a pixel, rms] at which the texture alone gives 0.5."""
 SAME_SURFACE = 1.5
 """Difference of disparities [px] up to which two pixels count as one surface."""
+DEVIATIONS = np.array([2.67, 2.08, 1.40, 0.99, 0.71, 0.53, 0.43, 0.34, 0.27, 0.22, 0.22], np.float32)
+"""Standard deviation of a disparity of confidence 0, 0.1 ... 1 [px]: what 68 % of the errors stay under (four generated
+rooms with noisy pictures, 7.8 million pixels)."""
 AROUND = tuple((dx, dy) for r in (4, 8) for dx in (-r, 0, r) for dy in (-r, 0, r) if (dx, dy) != (0, 0))
 """Places around a pixel (columns, rows) whose disparities are compared with its own."""
 
@@ -47,6 +50,11 @@ def confidence_of(difference: np.ndarray, disparity: np.ndarray, gray: np.ndarra
     texture = change / (change + TEXTURE_HALF**2)
     sure = agreement * texture * same_surface(disparity)
     return np.where(np.isfinite(difference) & np.isfinite(disparity), sure, 0.0).astype(np.float32)
+
+
+def deviation_of(confidence: np.ndarray) -> np.ndarray:
+    """Return the standard deviation (H, W) float32 [px] of disparities of a confidence (H, W), 0 to 1."""
+    return np.interp(confidence, np.linspace(0, 1, len(DEVIATIONS)), DEVIATIONS).astype(np.float32)
 
 
 def same_surface(disparity: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 from scenewright.schemas.disparity import Disparity, DisparityFile, FrameDisparity, RowReport
 from scenewright.schemas.sequence import Sequence, SequenceFile
 from scenewright.stages.disparity import semi_global
+from scenewright.stages.disparity.consistency import deviation_of
 from scenewright.stages.disparity.eyes import check_eyes, is_blank, stereo_cameras
 from scenewright.stages.disparity.parameters import DisparityParameters
 from scenewright.stages.disparity.rectification import straightened
@@ -21,7 +22,7 @@ from scenewright.stages.kit.formats.foxglove import nanoseconds
 from scenewright.stages.kit.formats.frames import Frame, FrameReader, FrameWriter
 from scenewright.stages.kit.formats.trajectories import write_tum
 from scenewright.stages.kit.stage import Context
-from scenewright.stages.kit.stereo.disparity_map import DisparityMap, depth_of
+from scenewright.stages.kit.stereo.disparity_map import DisparityMap, depth_deviation, depth_of
 
 Matcher = Callable[[np.ndarray, np.ndarray, tuple[int, int]], DisparityMap]
 """Left and right (H, W, 3) uint8 RGB, and the limits of the search -> map."""
@@ -106,6 +107,7 @@ def _match_all(
             registered=True,
             label_table=reader.label_table,
             cameras=cameras,
+            deviation=True,
         ) as frames,
         DisparityWriter(context.output / "disparity.mcap", cameras) as maps,
     ):
@@ -129,7 +131,13 @@ def _match_all(
             stamp = nanoseconds(frame.time)
             encoded = reader.encoded(index)
             frames.write(
-                frame.time, encoded, depth, frame.world_from_camera, frame.labels, camera_name=frame.camera_name
+                frame.time,
+                encoded,
+                depth,
+                frame.world_from_camera,
+                frame.labels,
+                deviation=depth_deviation(depth, deviation_of(matched.confidence), camera, baseline),
+                camera_name=frame.camera_name,
             )
             maps.write(stamp, frame.camera_name, matched)
             _note(written, index, frame, matched, depth, limits)
@@ -184,7 +192,7 @@ def _finish(
 ) -> Disparity:
     info = sequence.info
     write_tum(context.output / "trajectory.tum", np.array(written.times), np.array(written.poses).reshape(-1, 4, 4))
-    streams: tuple[str, ...] = tuple(s for s in info.streams if s not in ("right", "depth"))
+    has = {*info.streams, "depth", "deviation"}
     SequenceFile.model_validate(
         info.model_dump()
         | {
@@ -195,7 +203,7 @@ def _finish(
                 for each in info.cameras
                 if each.name in rows
             ),
-            "streams": tuple(s for s in ("color", "depth", "labels", "pose") if s == "depth" or s in streams),
+            "streams": tuple(s for s in ("color", "depth", "labels", "pose", "deviation") if s in has),
             "frame_count": len(written.frames),
             "drops": dict(sorted((Counter(info.drops) + written.left_out).items())),
             "color_depth_registered": True,

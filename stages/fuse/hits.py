@@ -2,7 +2,7 @@
 
 A cell is the cube between eight voxel centres, as in surface.py, and is numbered like its first voxel. Points are taken
 about a voxel apart, but all of them where depth changes steeply from pixel to pixel: what is seen at a flat angle is
-sampled thinly in one direction.
+sampled thinly in one direction. Depth that is hardly known makes no point.
 """
 
 from __future__ import annotations
@@ -15,8 +15,15 @@ TILE = 4
 """Pixels a side that are looked at together."""
 STEEP = 2.0
 """A tile is steep where its depth changes by more than this many times its width: seen at less than 27 degrees."""
+LARGEST_DEVIATION = 0.08
+"""Depth of a larger standard deviation tells not in which cell its point is [m]."""
 MOST_HITS = 255
 """Largest count of a voxel: it has 8 bits."""
+
+
+def sure_depth(depth: np.ndarray, deviation: np.ndarray | None) -> np.ndarray:
+    """Return depth (H, W) float32 [m] that is 0 where its deviation (H, W) [m] is over LARGEST_DEVIATION."""
+    return depth if deviation is None else np.where(deviation <= LARGEST_DEVIATION, depth, np.float32(0))
 
 
 @compiled(nogil=True)

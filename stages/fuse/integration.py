@@ -2,7 +2,8 @@
 
 Weights follow Voxblox: a measurement at depth z weighs min(1, 1/z^2), as the noise of depth cameras grows with z^2,
 and falls linearly to zero from one voxel behind the surface to the truncation distance, as what lies behind a surface
-is a guess; thin boards seen from both sides survive that way.
+is a guess; thin boards seen from both sides survive that way. 1/z^2 is what inverse variances give for a deviation of
+1 % of the depth; where a frame states the deviation of a pixel, that one takes its place.
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ from __future__ import annotations
 import numpy as np
 from numba import parallel_chunksize, prange
 from scenewright.schemas.scene_parts import Camera
-from scenewright.stages.fuse.hits import count_hits
+from scenewright.stages.fuse.hits import count_hits, sure_depth
 from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, SIDE, VoxelBlocks
 from scenewright.stages.kit.compiled import compiled
 
+FULL_WEIGHT_DEVIATION = 0.02
+"""Depth of this standard deviation, or less, weighs 1 [m]."""
 LARGEST_VOTE = 32000
 """Largest lead of a voxel's label: it has 16 bits with a sign."""
 CHUNK = 64
@@ -35,6 +38,7 @@ def _integrate(
     segment: np.ndarray,
     votes: np.ndarray,
     depth: np.ndarray,
+    deviation: np.ndarray,
     image: np.ndarray,
     index_image: np.ndarray,
     label_of_index: np.ndarray,
@@ -59,6 +63,8 @@ def _integrate(
     drop = one / (band - voxel) if band > voxel else zero
     heaviest, nearest, farthest = np.float32(maximum_weight), np.float32(near), np.float32(far)
     step = (camera_from_world[:, :3] * voxel_size).astype(np.float32)
+    variance = np.float32(FULL_WEIGHT_DEVIATION * FULL_WEIGHT_DEVIATION)
+    has_deviation = deviation.shape[0] > 0
     has_color = image.shape[0] > 0
     has_labels = index_image.shape[0] > 0
     for number in prange(touched.shape[0]):
@@ -95,6 +101,10 @@ def _integrate(
                     continue
                 voxel_index = row_number * SIDE + i
                 gain = min(one, one / (measured * measured))
+                if has_deviation:
+                    sigma = deviation[row, column]
+                    if sigma > zero:
+                        gain = min(one, variance / (sigma * sigma))
                 if distance < -voxel:
                     gain *= (band + distance) * drop
                 old_weight = weight[slot, voxel_index]
@@ -130,6 +140,8 @@ def _integrate(
 
 NO_IMAGE = np.zeros((0, 0, 3), dtype=np.uint8)
 """Stands for the image of a frame without colour."""
+NO_DEVIATION = np.zeros((0, 0), dtype=np.float32)
+"""Stands for the deviations of a frame that states none."""
 NO_INDEX = np.zeros((0, 0), dtype=np.uint16)
 """Stands for the segments of a frame without any."""
 NO_LABELS = np.zeros(1, dtype=np.int32)
@@ -145,6 +157,7 @@ def integrate(
     truncation: float,
     near: float,
     far: float,
+    deviation: np.ndarray | None = None,
     color: np.ndarray | None = None,
     index_image: np.ndarray | None = None,
     label_of_index: np.ndarray = NO_LABELS,
@@ -155,12 +168,13 @@ def integrate(
 ) -> int:
     """Fuse one frame into `blocks`; return the number of blocks it touched.
 
-    depth (H, W) float32 [m], 0 invalid; world_from_camera (4, 4); color (H, W, 3) uint8 or None. Voxels centred within
-    `label_band` [m] (default: the truncation) of the measured depth vote: the pixel's index in index_image (H, W)
-    uint16 gives their global segment label label_of_index[index] (int32, 0: no vote). `canonical` (int32) tells which
-    label each earlier label was merged into. The vote: same label +1, another -1, below 0 it takes over with 1.
-    Voxels in front of the band count as free (value 1) in the blocks that are touched. Every voxel is written by one
-    thread only, so the result does not depend on their number.
+    depth (H, W) float32 [m], 0 invalid; deviation (H, W) float32 [m], its standard deviation, 0 unknown, or None;
+    world_from_camera (4, 4); color (H, W, 3) uint8 or None. Voxels centred within `label_band` [m] (default: the
+    truncation) of the measured depth vote: the pixel's index in index_image (H, W) uint16 gives their global segment
+    label label_of_index[index] (int32, 0: no vote). `canonical` (int32) tells which label each earlier label was merged
+    into. The vote: same label +1, another -1, below 0 it takes over with 1. Voxels in front of the band count as free
+    (value 1) in the blocks that are touched. Every voxel is written by one thread only, so the result does not depend
+    on their number.
     """
     intrinsics = intrinsics_of(camera)
     world_from_camera = np.ascontiguousarray(world_from_camera, dtype=np.float64)
@@ -168,7 +182,7 @@ def integrate(
     touched = blocks.touch(
         depth, intrinsics, world_from_camera, truncation=truncation, near=near, far=far, stride=stride
     )
-    count_hits(blocks, depth, intrinsics, world_from_camera, near=near, far=far)
+    count_hits(blocks, sure_depth(depth, deviation), intrinsics, world_from_camera, near=near, far=far)
     with parallel_chunksize(CHUNK):
         _integrate(
             touched,
@@ -179,6 +193,7 @@ def integrate(
             blocks.segment,
             blocks.votes,
             depth,
+            NO_DEVIATION if deviation is None else np.ascontiguousarray(deviation, dtype=np.float32),
             NO_IMAGE if color is None else np.ascontiguousarray(color),
             NO_INDEX if index_image is None else index_image,
             label_of_index,

@@ -67,8 +67,10 @@ class PanopticMapper:
         world_from_camera: np.ndarray,
         ids: np.ndarray | None = None,
         listing: Sequence[FrameSegment] = (),
+        deviation: np.ndarray | None = None,
     ) -> None:
-        """Fuse one frame: depth (H, W) float32 [m], colour (H, W, 3) uint8 or None, world_from_camera (4, 4).
+        """Fuse one frame: depth (H, W) float32 [m], colour (H, W, 3) uint8 or None, world_from_camera (4, 4), deviation
+        of depth (H, W) float32 [m] (0: unknown) or None.
 
         ids (H, W) int32: the frame's panoptic image, whose values `listing` explains; None fuses geometry alone. Raises
         BadInput for images of different sizes, for an id that is not listed, and for a camera too far from the origin
@@ -76,7 +78,7 @@ class PanopticMapper:
         """
         options = self.parameters
         expected = (camera.height, camera.width)
-        for name, image in (("depth", depth), ("colour", color), ("segments", ids)):
+        for name, image in (("depth", depth), ("colour", color), ("segments", ids), ("deviation", deviation)):
             if image is not None and image.shape[:2] != expected:
                 raise BadInput(
                     f"{name} of the frame is {image.shape[1]}x{image.shape[0]}, the camera {expected[1]}x{expected[0]}",
@@ -99,6 +101,7 @@ class PanopticMapper:
             truncation=self.truncation_distance,
             near=options.minimum_depth,
             far=options.maximum_depth,
+            deviation=deviation,
             color=color,
             index_image=index_image,
             label_of_index=frame_labels,

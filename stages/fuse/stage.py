@@ -139,7 +139,7 @@ def _integrate_frames(
 
         def read() -> Iterator[tuple[Frame, np.ndarray | None, np.ndarray | None]]:
             """Frames with their poses and, where there are depth, pose and listing, ids."""
-            for frame in reader.frames(streams=("color", "depth"), every=parameters.every):
+            for frame in reader.frames(streams=("color", "depth", "deviation"), every=parameters.every):
                 pose = frame.world_from_camera if poses is None else poses[frame.index]
                 used = frame.depth is not None and (frame.depth > 0).any()
                 if not used:
@@ -163,5 +163,5 @@ def _integrate_frames(
                 listing = listed.get(frame.index)
                 camera = cameras[frame.camera_name]
                 depth = frame.depth if outdated is None else outdated.without(frame.depth, camera, pose, frame.index)
-                mapper.add_frame(camera, depth, frame.color, pose, ids, listing or ())
+                mapper.add_frame(camera, depth, frame.color, pose, ids, listing or (), frame.deviation)
     return mapper, skipped, label

@@ -14,9 +14,15 @@ from scenewright.stages.kit.geometry.cameras import back_project
 
 
 def registered_loader(
-    load: Callable[[], LoadedFrame], depth_camera: Camera, color_camera: Camera, color_from_depth: np.ndarray
+    load: Callable[[], LoadedFrame],
+    depth_camera: Camera,
+    color_camera: Camera,
+    color_from_depth: np.ndarray,
+    *,
+    keep: bool = False,
 ) -> Callable[[], LoadedFrame]:
-    """Return a function that loads a frame as `load` does, with its colour resampled into the depth camera."""
+    """Return a function that loads a frame as `load` does, with its colour resampled into the depth camera; `keep`s the
+    colour as it is as the frame's picture."""
 
     def registered() -> LoadedFrame:
         frame = load()
@@ -27,7 +33,7 @@ def registered_loader(
             raise Unusable("undecodable_color")
         depth = millimetres_to_depth(frame.depth)
         registered_color = color_in_depth_camera(color, depth, depth_camera, color_camera, color_from_depth)
-        return replace(frame, color=registered_color)
+        return replace(frame, color=registered_color, picture=frame.color if keep else None)
 
     return registered
 

@@ -10,7 +10,13 @@ from typing import NamedTuple
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import OF_TOPICS
 from scenewright.stages.ingest.eye_order import settled_eyes
-from scenewright.stages.ingest.foreign import refuse_foreign_file, refuse_foreign_folder, refuse_lone_recording
+from scenewright.stages.ingest.foreign import (
+    BY_ENDING,
+    SHOWN,
+    meant_to_be_read,
+    refuse_foreign_file,
+    refuse_lone_recording,
+)
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.registry import LogLayout, all_layouts
 from scenewright.stages.ingest.source import LogSource
@@ -18,6 +24,8 @@ from scenewright.stages.ingest.source import LogSource
 OF_ANY_IMAGES = "images"
 """The layout that matches any folder with images, and so those of other tools."""
 
+MOST_LOOKED_AT = 200
+"""Entries of a folder among which logs are looked for."""
 TOPICS = ("color_topic", "depth_topic", "right_topic", "pose_topic")
 
 
@@ -48,7 +56,7 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
         reader = log_format(layout)
         rule = reader.matches(path)
         if rule is not None and guessed and layout.name == OF_ANY_IMAGES:
-            refuse_foreign_folder(path)
+            refuse_logs_within(path)
         if rule is not None:
             _check_topics(layout, parameters, path)
             source = reader.open_source(path, parameters, rule)
@@ -58,7 +66,7 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
                 source.close()
                 raise
     if path.is_dir():
-        refuse_foreign_folder(path)
+        refuse_logs_within(path)
         refuse_lone_recording(path)
     names = ", ".join(layout.name for layout in layouts)
     kind = "a file" if path.is_file() else "a folder with " + (_listing(path) or "nothing in it")
@@ -66,6 +74,22 @@ def open_log(path: Path, parameters: IngestParameters) -> LogSource:
         f"{path}: is not a log in a format that is known ({names}); it is {kind}",
         hint="docs/LOGS.md describes the layouts",
     )
+
+
+def refuse_logs_within(root: Path) -> None:
+    """Raise BadInput for a folder of recordings, naming them: one is meant. A calibration or poses beside images mean
+    those."""
+    if meant_to_be_read(root):
+        return
+    readers = [log_format(layout) for layout in all_layouts() if layout.name != OF_ANY_IMAGES]
+    entries = sorted(entry for entry in root.iterdir() if not entry.name.startswith("."))[:MOST_LOOKED_AT]
+    own = [entry for entry in entries if entry.suffix.lower() not in BY_ENDING]
+    logs = [entry.name for entry in own if any(reader.matches(entry) for reader in readers)]
+    if not logs:
+        return
+    listed = ", ".join(logs[:SHOWN]) + (", ..." if len(logs) > SHOWN else "")
+    what = f"a log in {logs[0]}" if len(logs) == 1 else f"{len(logs)} logs, {listed}"
+    raise BadInput(f"{root}: is no log, but holds {what}", hint=f"give {root / logs[0]}")
 
 
 def _check_topics(layout: LogLayout, parameters: IngestParameters, path: Path) -> None:

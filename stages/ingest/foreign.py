@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import opened
 from scenewright.stages.ingest.folders.calibration_search import calibration_file
-from scenewright.stages.ingest.folders.files import read_json
 from scenewright.stages.ingest.folders.pose_files import pose_file
 
 HEAD = 4_000_000
@@ -35,20 +33,20 @@ AZURE_KINECT = Foreign(
     "an Azure Kinect recording",
     f"take its images out with Open3D: python azure_kinect_mkv_reader.py --input {{}} --output OUT{THEN}",
 )
-VIDEO = Foreign("a video", "put it into a folder of its own with a calibration file (docs/LOGS.md), and give that")
-RECORD3D = Foreign(
-    "a Record3D recording",
-    f"export it as EXR + JPG sequence in the app, ns-process-data record3d --data FOLDER --output-dir OUT{THEN}",
+VIDEO = Foreign(
+    "a video",
+    "it holds no depth: docs/PHONE.md says what comes of one; that of a stereo camera is read from a folder of its own "
+    "with its calibration file (docs/LOGS.md)",
 )
 RTABMAP = Foreign(
     "an RTAB-Map database",
-    "write its images with rtabmap-export --images {} and its poses with rtabmap-export --poses_camera "
-    "--poses_format 10 {}; give ingest the folder, and the poses as --trajectory",
+    "rtabmap-export --images --poses_camera --poses_format 10 {} writes NAME_rgb, NAME_depth, NAME_calib and "
+    "NAME_camera_poses.txt: put the first two into a folder as rgb and depth, a file of the third as calibration.yaml, "
+    "and ingest it with --trajectory NAME_camera_poses.txt",
 )
 BY_ENDING = {
     ".mkv": VIDEO,
     **dict.fromkeys((".mp4", ".mov", ".avi", ".webm"), VIDEO),
-    ".r3d": RECORD3D,
     **dict.fromkeys(
         (".svo", ".svo2"),
         Foreign(
@@ -64,7 +62,9 @@ BY_ENDING = {
     ".klg": Foreign(
         "a log of Kintinuous or ElasticFusion", "write its colour and 16-bit depth as PNG into color/ and depth/"
     ),
-    ".usdz": Foreign("a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh"),
+    ".usdz": Foreign(
+        "a USDZ model, no recording", "export the scan as PLY for scenewright fuse --from-mesh, or its raw data"
+    ),
     ".vrs": Foreign(
         "a Project Aria recording", f"ns-process-data aria --vrs-file {{}} --output-dir OUT (nerfstudio){THEN}"
     ),
@@ -92,13 +92,9 @@ def refuse_foreign_file(path: Path) -> None:
     _refuse(path, found)
 
 
-def refuse_foreign_folder(root: Path) -> None:
-    """Raise BadInput for a folder as another tool wrote it; one with a calibration or poses is meant to be read."""
-    if calibration_file(root) is not None or pose_file(root) is not None:
-        return
-    for found, is_one in FOLDERS:
-        if is_one(root):
-            _refuse(root, found)
+def meant_to_be_read(root: Path) -> bool:
+    """Whether a calibration or poses lie in a folder: whoever puts them there means its pictures."""
+    return calibration_file(root) is not None or pose_file(root) is not None
 
 
 def refuse_lone_recording(root: Path) -> None:
@@ -121,70 +117,3 @@ def _refuse(path: Path, found: Foreign) -> None:
 def _head(path: Path) -> bytes:
     with opened(path) as file:
         return file.read(HEAD)
-
-
-def _is_stray_scanner(root: Path) -> bool:
-    return (root / "camera_matrix.csv").is_file() and (root / "odometry.csv").is_file()
-
-
-def _is_record3d(root: Path) -> bool:
-    if (root / "EXR_RGBD").is_dir() or any(root.glob("rgbd/*.conf")):
-        return True
-    if not (root / "metadata.json").is_file():
-        return False
-    try:
-        document = read_json(root / "metadata.json")
-    except BadInput:
-        return False
-    return isinstance(document, dict) and {"K", "poses"} <= document.keys()
-
-
-def _is_polycam(root: Path) -> bool:
-    """Whether JSON files of cameras lie in it that state a pose number by number."""
-    folders = (folder / name for folder in (root / "keyframes", root) for name in ("cameras", "corrected_cameras"))
-    first = next((path for folder in folders for path in sorted(folder.glob("*.json"))), None)
-    return first is not None and b'"t_00"' in _head(first)
-
-
-def _is_scanner_app(root: Path) -> bool:
-    return (root / "frame_00000.jpg").is_file() and (root / "frame_00000.json").is_file()
-
-
-def _is_arkit_scenes(root: Path) -> bool:
-    return (root / "lowres_depth").is_dir() and any(root.glob("*.traj"))
-
-
-FOLDERS: tuple[tuple[Foreign, Callable[[Path], bool]], ...] = (
-    (
-        Foreign(
-            "a Stray Scanner recording",
-            "make a ROS bag of it: python create_rosbag.py {} --out OUT.bag (StrayVisualizer), then ingest OUT.bag",
-        ),
-        _is_stray_scanner,
-    ),
-    (
-        Foreign("a Record3D recording", f"ns-process-data record3d --data {{}} --output-dir OUT (nerfstudio){THEN}"),
-        _is_record3d,
-    ),
-    (
-        Foreign(
-            "a Polycam raw export",
-            f"ns-process-data polycam --data {{}} --output-dir OUT --use-depth (nerfstudio){THEN}",
-        ),
-        _is_polycam,
-    ),
-    (
-        Foreign(
-            "a recording of the 3D Scanner App",
-            "write its poses and intrinsics as transforms.json (docs/LOGS.md, layout nerfstudio)",
-        ),
-        _is_scanner_app,
-    ),
-    (
-        Foreign(
-            "a recording of ARKitScenes",
-            "write its poses and intrinsics as transforms.json (docs/LOGS.md, layout nerfstudio)",
-        ),
-        _is_arkit_scenes,
-    ),
-)

@@ -41,11 +41,14 @@ def usable_color(data: bytes, camera: Camera) -> np.ndarray | bytes:
     image = decode_as_calibrated(data, (camera.width, camera.height))
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes")
+    return data if is_kept(data, image, camera) else fitted_color(image, camera)
+
+
+def is_kept(data: bytes, image: np.ndarray, camera: Camera) -> bool:
+    """Whether the bytes of an `image` (H, W, 3) as it was decoded are, as they are, a picture of the camera."""
     if orientation_of(data) in TRANSPOSED and image_size(data) != (image.shape[1], image.shape[0]):
-        return fitted_color(image, camera)
-    if image.shape[:2] == (camera.height, camera.width) and _is_plain(data):
-        return data
-    return fitted_color(image, camera)
+        return False
+    return image.shape[:2] == (camera.height, camera.width) and _is_plain(data)
 
 
 def decode_as_calibrated(data: bytes, size: tuple[int, int]) -> np.ndarray | None:
@@ -58,10 +61,10 @@ def decode_as_calibrated(data: bytes, size: tuple[int, int]) -> np.ndarray | Non
     if image is None or (orientation := orientation_of(data)) not in TRANSPOSED:
         return image
     stored, looked_at = (image.shape[1], image.shape[0]), (image.shape[0], image.shape[1])
-    return turned(image, orientation) if _alike(looked_at, size) and not _alike(stored, size) else image
+    return turned(image, orientation) if same_shape(looked_at, size) and not same_shape(stored, size) else image
 
 
-def _alike(first: tuple[int, int], second: tuple[int, int]) -> bool:
+def same_shape(first: tuple[int, int], second: tuple[int, int]) -> bool:
     """Whether two sizes are of one shape, to a pixel."""
     return abs(first[0] * second[1] - first[1] * second[0]) <= max(*first, *second)
 

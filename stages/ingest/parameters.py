@@ -10,7 +10,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.ingest.pose_convention_names import PoseConvention
 from scenewright.stages.ingest.registry import all_layouts
 from scenewright.stages.kit.estimates import LOG_MEGABYTES_PER_MEGAPIXEL, Estimate, Inputs
-from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.stages.kit.stage import External, Extra, Optionally, Parameters, Stage
 
 if TYPE_CHECKING:
     LogFormatName = str
@@ -52,6 +52,9 @@ class IngestParameters(Parameters):
         True,
         description="Resample the colour of 7-Scenes Kinect logs (640x480, focal length 585) into the depth camera, "
         "from which it was recorded 3 cm apart",
+    )
+    turn: bool = Field(
+        True, description="Turn recordings of phones whose pictures lie on their side, where the log says what is up"
     )
     gravity: Literal["auto", "given", "floor", "imu", "camera-up", "none"] = Field(
         "auto",
@@ -136,6 +139,10 @@ STAGE = Stage(
         "numba",
         "lz4",
         "ruamel.yaml",
+    ),
+    extras=(
+        Extra("OpenEXR", "OpenEXR", "depth in .exr files: pip install OpenEXR"),
+        Extra("lzfse", "lzfse", "Record3D's .r3d files: pip install lzfse"),
     ),
     example="scenewright ingest --log recording.mcap --out outputs/kitchen/sequence",
     check=check,

@@ -46,6 +46,10 @@ class LoadedFrame:
     """(H, W) uint16 instance ids."""
     right: np.ndarray | bytes | None = None
     """Right eye of a rectified stereo pair, like `color`."""
+    deviation: np.ndarray | None = None
+    """(H, W) float32 standard deviation of depth [m], 0 = unknown."""
+    picture: np.ndarray | bytes | None = None
+    """Colour at its full size, like `color`, where that is larger than the frame."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ class SourceCamera:
     it is the left one, until `settled_eyes` has looked at the pictures."""
     registered: bool = True
     """Whether depth pixels and colour pixels see the same ray, as far as the log says."""
+    picture: Camera | None = None
+    """The same camera at the size of the frames' pictures, where these are larger than the frames."""
     eyes: tuple[str, str] = ("left", "right")
     """What the two eyes are called in the log: topics, or folders."""
 
@@ -118,6 +124,7 @@ class LogSource:
     """(3,) up in the log's world as measured by an IMU, where the log has one."""
     label_table: tuple[LabelEntry, ...] = ()
     has_labels: bool = False
+    has_deviation: bool = False
     damage: tuple[str, ...] = ()
     """What of the log could not be read at all (torn end, damaged chunks, messages that do not decode): one line each,
     with counts and places."""

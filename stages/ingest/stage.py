@@ -163,6 +163,8 @@ def _write_frames(
             label_table=source.label_table,
             cameras={each.name: each.camera for each in source.cameras},
             baselines={each.name: each.baseline for each in source.cameras if each.baseline is not None},
+            deviation=source.has_deviation,
+            picture_cameras={each.name: each.picture for each in source.cameras if each.picture is not None},
         ) as writer,
         ThreadPoolExecutor(1, thread_name_prefix="write") as thread,
     ):
@@ -194,6 +196,8 @@ def _write_frames(
                 pose,
                 loaded.labels,
                 right=loaded.right,
+                deviation=loaded.deviation,
+                picture=loaded.picture,
                 camera_name=entry.camera_name,
             )
             _note(written, time, entry, loaded, pose)
@@ -207,7 +211,8 @@ def _note(written: _Written, time: float, entry: Entry, loaded: LoadedFrame, pos
         written.brightness.append(brightness_of(loaded.color))
     if loaded.depth is not None and len(written.times) % LIT_EVERY == 0:
         written.roughness.append(depth_roughness(loaded.depth))
-    if isinstance(loaded.color, bytes) and orientation_of(loaded.color) != 1:
+    recorded = loaded.color if loaded.picture is None else loaded.picture
+    if isinstance(recorded, bytes) and orientation_of(recorded) != 1:
         written.orientations += 1
     written.entries.append(entry)
     written.times.append(time)
@@ -218,6 +223,8 @@ def _note(written: _Written, time: float, entry: Entry, loaded: LoadedFrame, pos
         "right": loaded.right,
         "labels": loaded.labels,
         "pose": pose,
+        "deviation": loaded.deviation,
+        "picture": loaded.picture,
     }
     written.streams |= {name for name, value in streams.items() if value is not None}
     if loaded.depth is not None:
@@ -234,7 +241,7 @@ def _within(loaded: LoadedFrame, maximum_depth: float | None) -> LoadedFrame:
     depth = np.where(loaded.depth <= maximum_depth * 1000, loaded.depth, np.uint16(0))
     if not depth.any():
         raise Unusable("no_valid_depth", f"nothing within {maximum_depth:g} m")
-    return replace(loaded, depth=depth)
+    return replace(loaded, depth=depth, deviation=None if loaded.deviation is None else loaded.deviation * (depth > 0))
 
 
 def _finish(
@@ -259,7 +266,11 @@ def _finish(
         camera=source.camera,
         cameras=tuple(
             SequenceCamera(
-                name=entry.name, camera=entry.camera, baseline=entry.baseline, frame_count=counts[entry.name]
+                name=entry.name,
+                camera=entry.camera,
+                baseline=entry.baseline,
+                picture=entry.picture,
+                frame_count=counts[entry.name],
             )
             for entry in source.cameras
         ),

@@ -8,12 +8,15 @@ from types import ModuleType
 from scenewright.schemas.errors import MissingDependency
 
 
-def needed(name: str, purpose: str) -> ModuleType:
-    """Import a module for a purpose ("bundle adjustment"). Raises MissingDependency, which names both."""
+def needed(name: str, purpose: str, extra: str | None = None) -> ModuleType:
+    """Import a module for a purpose ("bundle adjustment"), which an `extra` of this project brings or pip alone. Raises
+    MissingDependency, which names all."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
         raise MissingDependency(
             f"{name} cannot be imported, which {purpose} needs ({error})",
-            hint=f"pip install {name}, where it has a package for this machine",
+            hint=f"pip install 'scenewright[{extra}]'"
+            if extra
+            else f"pip install {name}, where it has a package for this machine",
         ) from None

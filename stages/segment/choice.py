@@ -12,6 +12,7 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.stage import Parameters
+from scenewright.stages.segment.full_pictures import OnFullPictures
 from scenewright.stages.segment.panoptic import Backend
 from scenewright.stages.segment.parameters import SegmentParameters
 from scenewright.stages.segment.registry import AUTO, BackendDeclaration, all_backends, automatic, backends_for
@@ -92,7 +93,9 @@ def choose_backend(request: BackendRequest) -> Backend:
     opened: list[Backend] = []
     for position, (declared, part) in enumerate(asked):
         try:
-            opened.append(declared.load("backend").open_backend(part))
+            backend = declared.load("backend").open_backend(part)
+            shown = declared.of_pictures and request.reader is not None and "picture" in request.reader.streams
+            opened.append(OnFullPictures(backend, request.reader) if shown and request.reader else backend)
         except BadInput as error:
             if position == len(asked) - 1 and not opened:
                 raise

@@ -68,6 +68,8 @@ class BackendDeclaration:
     apart: bool = False
     """Whether it judges a frame by that frame alone and needs little memory, so that frames may be segmented in
     processes of their own."""
+    of_pictures: bool = False
+    """Whether its masks come of the picture alone, whatever its size: it is shown full pictures where there are any."""
     address: str = ""
     """How an http address reads that is given in place of the name; empty: it goes by its name."""
     nameless: bool = False

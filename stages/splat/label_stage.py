@@ -17,7 +17,7 @@ from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.open_words.opening import open_encoder
 from scenewright.stages.kit.open_words.vectors import of_regions, write_vectors
 from scenewright.stages.kit.stage import Context
-from scenewright.stages.splat.language.looks import Sight, looks
+from scenewright.stages.splat.language.looks import looks, sight_of
 from scenewright.stages.splat.parameters import LabelParameters
 from scenewright.stages.splat.views import evenly, posed_frames
 
@@ -48,8 +48,7 @@ def run(
         for frame in context.progress.track(frames, total=len(frames), description="pictures"):
             frame_read = reader.read(frame, ("color", "depth"))
             if frame_read.color is not None and frame_read.depth is not None:
-                camera = reader.cameras[frame_read.camera_name]
-                sights.append(Sight(frame_read.color, frame_read.depth, camera, inverse(poses[frame])))
+                sights.append(sight_of(reader, frame_read, frame_read.depth, inverse(poses[frame])))
     with context.progress.step("look"):
         vectors, counts = looks(meshes, sights, encoder)
     write_vectors(context.output, of_regions(vectors))

@@ -27,7 +27,7 @@ from scenewright.stages.splat.build_stage import rasterizer_of
 from scenewright.stages.splat.language.entities import NONE, entity_of, nearest_entities
 from scenewright.stages.splat.language.field import LanguageField
 from scenewright.stages.splat.language.learning import learn, lesson_of
-from scenewright.stages.splat.language.looks import Sight, looks
+from scenewright.stages.splat.language.looks import looks, sight_of
 from scenewright.stages.splat.language.pieces import pieces
 from scenewright.stages.splat.language.pyramid import pyramid
 from scenewright.stages.splat.parameters import LanguageParameters
@@ -80,7 +80,7 @@ def run(
                 depth = np.where(drawn.alpha > COVERED, drawn.depth / np.maximum(drawn.alpha, 1e-6), 0).astype(
                     np.float32
                 )
-            sights.append(Sight(frame_read.color, depth, camera, pose))
+            sights.append(sight_of(reader, frame_read, depth, pose))
     field, losses = _field(gaussians.means, encoder.width, context.seed), deque[float](maxlen=LAST)
     if any(len(lesson.places) for lesson in lessons):
         taught = learn(field, lessons, parameters.steps, context.random(1))

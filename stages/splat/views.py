@@ -12,7 +12,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.formats.frames import Frame, FrameReader
-from scenewright.stages.kit.geometry.cameras import scaled
+from scenewright.stages.kit.geometry.cameras import scaled, seen_by
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.own_trajectory import frame_poses
 
@@ -61,22 +61,34 @@ def posed_frames(
 
 
 def read_view(reader: FrameReader, frame: int, world_from_camera: np.ndarray, width: int) -> PosedView | None:
-    """Return a frame at most `width` pixels wide; None without colour, or where it is dark."""
+    """Return a frame at most `width` pixels wide, of its full picture where it has one and is smaller than that; None
+    without colour, or where it is dark."""
     frame_read: Frame = reader.read(frame, ("color", "depth"))
     if frame_read.color is None or float(frame_read.color.mean()) < 255 * DARK:
         return None
-    camera = reader.cameras[frame_read.camera_name]
-    factor = min(1.0, width / camera.width)
-    small = scaled(camera, factor) if factor < 1 else camera
-    size = (small.width, small.height)
-    color = frame_read.color if factor == 1 else cv2.resize(frame_read.color, size, interpolation=cv2.INTER_AREA)
-    depth = frame_read.depth
-    if depth is not None and factor < 1:
-        depth = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)
+    color, depth, camera = sharpest(reader, frame_read, width)
     pose = inverse(world_from_camera)
     return PosedView(
-        frame, frame_read.time, frame_read.camera_name, small, color.astype(np.float32) / np.float32(255), depth, pose
+        frame, frame_read.time, frame_read.camera_name, camera, color.astype(np.float32) / np.float32(255), depth, pose
     )
+
+
+def sharpest(reader: FrameReader, frame: Frame, width: int) -> tuple[np.ndarray, np.ndarray | None, Camera]:
+    """Return colour (H, W, 3) uint8, depth (H, W) [m] and camera of a frame that has colour, at most `width` wide: of
+    its full picture where it has one and is smaller than that, with depth of the nearest pixel."""
+    assert frame.color is not None
+    color, depth, camera = frame.color, frame.depth, reader.cameras[frame.camera_name]
+    picture = reader.read(frame.index, ("picture",)).picture if width > camera.width else None
+    if picture is not None:
+        full = reader.picture_cameras[frame.camera_name]
+        color, depth, camera = picture, None if depth is None else seen_by(depth, camera, full), full
+    if width >= camera.width:
+        return color, depth, camera
+    small = scaled(camera, width / camera.width)
+    size = (small.width, small.height)
+    if depth is not None:
+        depth = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)
+    return cv2.resize(color, size, interpolation=cv2.INTER_AREA), depth, small
 
 
 def held_out(count: int, every: int) -> list[int]:

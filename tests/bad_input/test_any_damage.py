@@ -16,11 +16,16 @@ MOST_INPUTS = 200
 """Of one sort of damage, for each door; ten for each sample where it has more than twenty."""
 UNREADABLE = {("image_message", "nonsense"), ("rosbag2_metadata", "of mcap")}
 """Samples for fuzzers that are refused as they are."""
-FOLDERS = "layout_7scenes layout_scannet layout_colmap layout_colmap_text "
+FOLDERS = (
+    "layout_7scenes layout_scannet layout_colmap layout_colmap_text layout_stray_scanner layout_polycam "
+    "layout_scanner_app "
+)
 """Layouts with describing files that nothing is read from."""
 READ = {
-    "empty": FOLDERS + "layout_redwood layout_tum layout_scenenn layout_replica obj message transcript ros_definition",
-    "cut in the middle": FOLDERS + "layout_tum obj stl calibration_file transcript ros_definition",
+    "empty": FOLDERS
+    + "layout_arkit_scenes layout_redwood layout_tum layout_scenenn layout_replica obj message transcript "
+    "ros_definition",
+    "cut in the middle": FOLDERS + "layout_arkit_scenes layout_tum obj stl calibration_file transcript ros_definition",
     "words": FOLDERS + "obj",
     "no UTF-8": FOLDERS + "panoptic_zip npz image_message model_reply",
     "a zero byte": FOLDERS + "stl message compressed_depth image_message depth_array calibration_file ros_definition",
@@ -41,7 +46,8 @@ IN_PART = {
 """Damage -> the doors that refuse some and read the rest; `rosbag2_metadata` always, as a bag is read without it."""
 CUT_NOWHERE = (
     "panoptic_zip panoptic_png npz our_ply glb urdf manifest json_payload frames_mcap compressed_depth image_message "
-    "layout_nerfstudio depth_array onnx_sidecar model_answer service_reply service_info service_request"
+    "layout_nerfstudio layout_record3d layout_scannetpp "
+    "depth_array onnx_sidecar model_answer service_reply service_info service_request"
 )
 """Doors that refuse every beginning of every sample."""
 

@@ -204,7 +204,6 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
             )
         ],
         ("transforms.json", '{"frames": ' + "9" * 5000 + "}", "transforms.json"),
-        ("transforms.json", in_frames(depth_file_path=["depth/1.exr"]), "OpenEXR.*16-bit PNG"),
     ],
     "colmap": [
         (CAMERAS, Bytes(0, struct.pack("<Q", 2**62)), "declares 4611686018427387904 cameras"),

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.detection import open_log
+from scenewright.stages.ingest.own_poses import with_own_poses
 from scenewright.stages.ingest.parameters import IngestParameters
-from scenewright.stages.ingest.preflight.inspection import inspect_log
-from scenewright.stages.kit.progress import SilentProgress
 
-from tests.unit.ingest.folder_writers import write_image_folder
-from tests.unit.ingest.tiny_room import CAMERA, frames, jpeg
+from tests.unit.ingest.folder_writers import stamp_text, tum_line, write_image_folder
+from tests.unit.ingest.tiny_room import CAMERA, frames, jpeg, millimetres, png
 
 GIVEN = {"fx": CAMERA.fx, "fy": CAMERA.fy, "cx": CAMERA.cx, "cy": CAMERA.cy}
 
@@ -28,59 +25,25 @@ def pictures(root: Path) -> Path:
     return root
 
 
-def stray_scanner(root: Path) -> None:
-    pictures(root)
-    (root / "camera_matrix.csv").write_text("80,0,47\n0,80,35\n0,0,1\n")
-    (root / "odometry.csv").write_text("timestamp, frame, x, y, z, qx, qy, qz, qw\n0, 000000, 0,0,0,0,0,0,1\n")
-
-
-def record3d(root: Path) -> None:
-    pictures(root)
-    (root / "metadata.json").write_text(
-        json.dumps({"K": [80, 0, 0, 0, 80, 0, 47, 35, 1], "poses": [[0] * 7], "fps": 60})
-    )
-
-
-def polycam(root: Path) -> None:
-    for name in ("images", "cameras", "depth"):
-        (root / "keyframes" / name).mkdir(parents=True)
-    (root / "keyframes" / "images" / "1.jpg").write_bytes(jpeg(np.zeros((8, 8, 3), np.uint8)))
-    (root / "keyframes" / "cameras" / "1.json").write_text('{"fx": 80, "t_00": 1.0, "t_01": 0.0}')
-
-
-def scanner_app(root: Path) -> None:
-    root.mkdir()
-    (root / "frame_00000.jpg").write_bytes(jpeg(np.zeros((8, 8, 3), np.uint8)))
-    (root / "frame_00000.json").write_text("{}")
-
-
-FOLDERS: dict[str, tuple[Callable[[Path], None], str]] = {
-    "a Stray Scanner recording": (stray_scanner, "create_rosbag.py"),
-    "a Record3D recording": (record3d, "ns-process-data record3d"),
-    "a Polycam raw export": (polycam, "ns-process-data polycam"),
-    "a recording of the 3D Scanner App": (scanner_app, "transforms.json"),
-}
-
-
-@pytest.mark.parametrize("command", ["ingest", "inspect"])
-@pytest.mark.parametrize("name", FOLDERS)
-def test_folders_of_phones_are_told_apart(tmp_path: Path, name: str, command: str) -> None:
-    write, way = FOLDERS[name]
-    write(tmp_path / "log")
-    for options in ({}, GIVEN):  # intrinsics by option would make a log without poses of it
-        with pytest.raises(BadInput) as caught:
-            parameters = IngestParameters(**options)  # type: ignore[arg-type]
-            if command == "ingest":
-                open_log(tmp_path / "log", parameters)
-            else:
-                inspect_log(tmp_path / "log", parameters, 4, SilentProgress())
-        assert name in str(caught.value) and way in str(caught.value) and "--fx" not in str(caught.value)
-
-
-def test_who_adds_a_calibration_means_the_pictures(tmp_path: Path) -> None:
-    record3d(tmp_path / "log")
-    (tmp_path / "log" / "intrinsics.txt").write_text(f"{CAMERA.fx} {CAMERA.fy} {CAMERA.cx} {CAMERA.cy}\n")
-    assert len(open_log(tmp_path / "log", IngestParameters()).entries) == 3
+RTABMAP_CALIBRATION = f"""%YAML:1.0
+---
+camera_name: "1305031102.175304"
+image_width: {CAMERA.width}
+image_height: {CAMERA.height}
+camera_matrix:
+   rows: 3
+   cols: 3
+   data: [ {CAMERA.fx}, 0., {CAMERA.cx}, 0., {CAMERA.fy}, {CAMERA.cy}, 0., 0., 1. ]
+distortion_coefficients:
+   rows: 1
+   cols: 5
+   data: [ 0., 0., 0., 0., 0. ]
+distortion_model: plumb_bob
+local_transform:
+   rows: 3
+   cols: 4
+   data: [ 0., 0., 1., 0., -1., 0., 0., 0., 0., -1., 0., 0. ]
+"""
 
 
 def rtabmap_database(path: Path) -> None:
@@ -91,7 +54,6 @@ def rtabmap_database(path: Path) -> None:
 FILES = {
     "log.mkv": ("a video", b"\x1a\x45\xdf\xa3 webm"),
     "kinect.mkv": ("an Azure Kinect recording", b"\x1a\x45\xdf\xa3 K4A_DEPTH_MODE"),
-    "log.r3d": ("a Record3D recording", b"PK\x03\x04"),
     "log.svo": ("a ZED recording", b"SVO"),
     "log.db": ("an RTAB-Map database", b""),
     "log.oni": ("an OpenNI recording", b"NI10"),
@@ -131,3 +93,25 @@ def test_tables_beside_images_are_named(tmp_path: Path) -> None:
         open_log(log, IngestParameters())
     notes = open_log(log, IngestParameters(**GIVEN)).notes  # type: ignore[arg-type]
     assert "not read: cameras.csv, capture.json, which may hold poses or intrinsics" in notes
+
+
+def test_what_rtabmap_exports_is_read_as_the_advice_says(tmp_path: Path) -> None:
+    """Pictures and depth by their stamps, a calibration in OpenCV's YAML, poses of the camera in TUM's form."""
+    with pytest.raises(BadInput, match="rtabmap-export --images --poses_camera --poses_format 10"):
+        rtabmap_database(tmp_path / "map.db")
+        open_log(tmp_path / "map.db", IngestParameters())
+    for name in ("rgb", "depth"):
+        (tmp_path / "log" / name).mkdir(parents=True)
+    lines = ["#timestamp x y z qx qy qz qw"]
+    for index, (color, depth, pose) in enumerate(frames(3)):
+        stem = stamp_text(index)
+        (tmp_path / "log" / "rgb" / f"{stem}.jpg").write_bytes(jpeg(color))
+        (tmp_path / "log" / "depth" / f"{stem}.png").write_bytes(png(millimetres(depth)))
+        lines.append(tum_line(stem, pose))
+    (tmp_path / "log" / "calibration.yaml").write_text(RTABMAP_CALIBRATION)
+    (tmp_path / "map_camera_poses.txt").write_text("\n".join(lines) + "\n")
+    source = open_log(tmp_path / "log", IngestParameters())
+    source = with_own_poses(source, tmp_path / "map_camera_poses.txt", IngestParameters())
+    assert source.camera == CAMERA and len(source.entries) == 3
+    for entry, (_, _, pose) in zip(source.entries, frames(3), strict=True):
+        assert np.abs(entry.world_from_camera - pose).max() < 1e-4

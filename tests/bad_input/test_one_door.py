@@ -71,6 +71,7 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/disparity/training/raft_stereo/kept_pairs.py": {"cv2.imread": TAUGHT},
     "stages/engine/code/digests.py": {"json.loads": CACHE, "read_text": CACHE},
     "stages/engine/code/program.py": {"read_text": OURS},
+    "stages/ingest/layouts/record3d/recording.py": {"zipfile.ZipFile": BOUNDED},
     "stages/kit/compiled.py": {"read_bytes": OURS},
     "stages/kit/exports.py": {"read_text": OURS},
     "stages/kit/formats/mosd_frames.py": {"cv2.imread": PICTURE},

@@ -28,6 +28,15 @@ from tests.unit.ingest.folder_writers import (
     write_scenenn,
     write_tum,
 )
+from tests.unit.ingest.phone_writers import (
+    Take,
+    write_arkit_scenes,
+    write_polycam,
+    write_record3d_pictures,
+    write_scanner_app,
+    write_scannetpp,
+    write_stray_scanner,
+)
 from tests.unit.ingest.tiny_room import frames, write_posed_images, write_redwood, write_seven_scenes
 
 WRITERS: dict[str, Callable[[Path, list], Path]] = {
@@ -42,9 +51,15 @@ WRITERS: dict[str, Callable[[Path, list], Path]] = {
     "colmap": write_colmap,
     "colmap_text": lambda root, recorded: write_colmap(root, recorded, binary=False),
     "images": write_image_folder,
+    "stray_scanner": lambda root, _: write_stray_scanner(root, Take(2)),
+    "record3d": lambda root, _: write_record3d_pictures(root, Take(2)),
+    "polycam": lambda root, _: write_polycam(root, Take(2)),
+    "scanner_app": lambda root, _: write_scanner_app(root, Take(2)),
+    "arkit_scenes": lambda root, _: write_arkit_scenes(root, Take(2)),
+    "scannetpp": lambda root, _: write_scannetpp(root, Take(2)),
 }
 INTRINSICS = {"fx": 80.0, "fy": 80.0, "cx": 47.5, "cy": 35.5}
-DESCRIBING = (".txt", ".json", ".log", ".ini", ".yaml", ".bin", ".freiburg")
+DESCRIBING = (".txt", ".json", ".log", ".ini", ".yaml", ".bin", ".freiburg", ".csv", ".traj", ".pincam")
 CALIBRATIONS = ("calibration.yaml", "camera.json", "calib.txt", "intrinsics.txt")
 
 

@@ -16,7 +16,8 @@ MODULES = {
     ),
     "tests.fuzz.layouts": (
         "layout_7scenes layout_redwood layout_posed_images layout_tum layout_scenenn layout_scannet "
-        "layout_nerfstudio layout_replica layout_colmap layout_colmap_text layout_images depth_array "
+        "layout_nerfstudio layout_replica layout_colmap layout_colmap_text layout_images layout_stray_scanner "
+        "layout_record3d layout_polycam layout_scanner_app layout_arkit_scenes layout_scannetpp depth_array "
         "calibration_file pose_list"
     ),
     "tests.fuzz.models": "library_model",

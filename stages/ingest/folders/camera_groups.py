@@ -46,13 +46,17 @@ def grouped(
     groups = []
     for number, size in enumerate(sizes, start=1):
         indices = [i for i, each in enumerate(recorded) if (each.camera.width, each.camera.height) == size]
-        cameras = [recorded[i].camera for i in indices]
-        middle = np.median([[each.fx, each.fy, each.cx, each.cy] for each in cameras], axis=0)
-        numbers = dict(zip(("fx", "fy", "cx", "cy"), map(float, middle), strict=True))
         name = "camera" if len(sizes) == 1 else f"camera_{number}"
-        groups.append(CameraGroup(name, Camera(width=size[0], height=size[1], **numbers), tuple(indices)))
+        groups.append(CameraGroup(name, median_camera([recorded[i].camera for i in indices]), tuple(indices)))
     note = f"{len(kinds)} different intrinsics: images are resampled to the median ones of their size"
     return tuple(groups), (note,)
+
+
+def median_camera(cameras: Sequence[Camera]) -> Camera:
+    """Return the camera of the median intrinsics of cameras of one size."""
+    middle = np.median([[each.fx, each.fy, each.cx, each.cy] for each in cameras], axis=0)
+    numbers = dict(zip(("fx", "fy", "cx", "cy"), map(float, middle), strict=True))
+    return Camera(width=cameras[0].width, height=cameras[0].height, **numbers)
 
 
 def _plain(label: str) -> str:

@@ -14,6 +14,7 @@ from scenewright.schemas.outside import file_content, json_of
 from scenewright.schemas.places import resolved
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.folders.depth_arrays import ARRAY_SUFFIXES, depth_array
+from scenewright.stages.ingest.folders.exr_depth import EXR_SUFFIX, exr_depth
 from scenewright.stages.ingest.images import DepthForm, decode_as_calibrated, decode_image, usable_color, usable_depth
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import LoadedFrame, Role, StreamInfo, Unusable
@@ -148,6 +149,8 @@ def raw_depth(path: Path) -> np.ndarray:
     data = file_bytes(path, "depth")
     if path.suffix.lower() in ARRAY_SUFFIXES:
         return depth_array(data, path.suffix.lower())
+    if path.suffix.lower() == EXR_SUFFIX:
+        return exr_depth(data)
     image = decode_image(data)
     if image is None:
         raise Unusable("undecodable_depth", f"{path.name}: {len(data)} bytes")
@@ -160,7 +163,7 @@ def depth_image_size(paths: Iterable[Path]) -> tuple[int, int] | None:
     """Return (width, height) of the first depth image that decodes, None when none does."""
     for path in paths:
         try:
-            if path.suffix.lower() in ARRAY_SUFFIXES:
+            if path.suffix.lower() in (*ARRAY_SUFFIXES, EXR_SUFFIX):
                 image: np.ndarray | None = raw_depth(path)
             else:
                 image = decode_image(file_bytes(path, "depth"))
@@ -184,16 +187,6 @@ def color_image_size(paths: Iterable[Path], stated: tuple[int, int] = (0, 0)) ->
         if image is not None:
             return image.shape[1], image.shape[0]
     return None
-
-
-def refuse_exr(names: Iterable[str], where: str) -> None:
-    """Raises BadInput when depth is in OpenEXR files, for which there is no reader here."""
-    exr = next((name for name in names if name.lower().endswith(".exr")), None)
-    if exr is not None:
-        raise BadInput(
-            f"{where}: depth {exr} is OpenEXR, which is not read",
-            hint="convert it to 16-bit PNG in millimetres, or to .npy in metres",
-        )
 
 
 def resized_camera(camera: Camera, size: tuple[int, int] | None, where: str) -> Camera:

@@ -70,7 +70,8 @@ LABEL_WORDS = frozenset(
 DEPTH_WORDS = frozenset({"depth"})
 COLOR_WORDS = frozenset({"color", "colour", "rgb", "bgr", "left", "right", "mono", "gray", "grey", "fisheye"})
 INFRARED_WORDS = frozenset({"ir", "infra", "infrared", "amplitude", "confidence", "thermal", "intensity"})
-DISPARITY_WORDS = frozenset({"disparity"})
+BESIDE_DEPTH_WORDS = frozenset({"disparity", "deviation"})
+"""What 16-bit and float images show that are of depth and are not depth."""
 PICTURE_WORDS = frozenset({"colorized", "colourised", "colormap", "heatmap", "visualization", "overlay", "debug"})
 PICTURE = "a picture of depth or labels for people, without the values"
 GREY_OR_PALETTE = (b"\0", b"\3")
@@ -100,8 +101,8 @@ def _role_and_reason(record: ImageRecord, topic: str) -> tuple[Role, str]:
     encoding = record.encoding.lower()
     if subject in LABEL_WORDS:
         return ("labels", "") if encoding in LABELS else ("other", f"labels in encoding {record.encoding!r:.40}")
-    if subject in DISPARITY_WORDS:
-        return "other", "disparity is not depth"
+    if subject in BESIDE_DEPTH_WORDS:
+        return "other", f"{subject} is not depth"
     if encoding == "16uc1":
         of_depth = subject in DEPTH_WORDS or not subject
         return ("depth", "") if of_depth else ("other", "16-bit images of a topic that is not of depth")
@@ -123,8 +124,8 @@ def _role_of_compressed(record: ImageRecord, subject: str, words: list[str]) -> 
     png = data.startswith(PNG_START)
     if subject in LABEL_WORDS:
         return ("labels", "") if png else ("other", "labels that are not in PNG have lost their ids")
-    if subject in DISPARITY_WORDS:
-        return "other", "disparity is not depth"
+    if subject in BESIDE_DEPTH_WORDS:
+        return "other", f"{subject} is not depth"
     one_channel = png and data[25:26] in GREY_OR_PALETTE
     if png and encoding.startswith(("16uc1", "32fc1")) or one_channel and subject in DEPTH_WORDS:
         return "depth", ""
@@ -136,7 +137,7 @@ def _role_of_compressed(record: ImageRecord, subject: str, words: list[str]) -> 
 
 def _color_or_picture(subject: str, words: list[str]) -> tuple[Role, str]:
     """Three channels of a topic about depth are made for people, and so are overlays on anything but colour."""
-    values = DEPTH_WORDS | LABEL_WORDS | DISPARITY_WORDS
+    values = DEPTH_WORDS | LABEL_WORDS | BESIDE_DEPTH_WORDS
     is_picture = PICTURE_WORDS.intersection(words) and values.intersection(words)
     return ("other", PICTURE) if is_picture or subject in DEPTH_WORDS else ("color", "")
 
@@ -148,7 +149,7 @@ def _telling_words(topic: str) -> list[str]:
     """
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", topic).lower()
     spaced = re.sub(r"(?:_to_|2)(?:color|colour|rgb|left|right|infra)|depth_?cam(?:era)?(?![a-z])", " ", spaced)
-    telling = LABEL_WORDS | DEPTH_WORDS | COLOR_WORDS | INFRARED_WORDS | DISPARITY_WORDS | PICTURE_WORDS
+    telling = LABEL_WORDS | DEPTH_WORDS | COLOR_WORDS | INFRARED_WORDS | BESIDE_DEPTH_WORDS | PICTURE_WORDS
     return [word for word in re.findall(r"[a-z]+", spaced) if word in telling]
 
 

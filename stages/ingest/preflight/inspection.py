@@ -12,8 +12,8 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.manifest import MANIFEST_NAME
 from scenewright.schemas.sequence import Sequence
-from scenewright.stages.ingest.detection import log_format, open_log
-from scenewright.stages.ingest.foreign import refuse_foreign_folder, refuse_lone_recording
+from scenewright.stages.ingest.detection import log_format, open_log, refuse_logs_within
+from scenewright.stages.ingest.foreign import refuse_lone_recording
 from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
@@ -111,7 +111,7 @@ def _refuse_what_is_nothing(path: Path, parameters: IngestParameters) -> None:
     if not (path.is_dir() and parameters.format == "auto"):
         return
     if not any(log_format(layout).matches(path) for layout in all_layouts()):
-        refuse_foreign_folder(path)
+        refuse_logs_within(path)
         refuse_lone_recording(path)
         raise BadInput(
             f"{path}: not an artifact (no {MANIFEST_NAME}), and no log in a format that is known",
@@ -443,6 +443,8 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
 
     if "depth" not in streams and not stereo:
         advice = "record depth; colour alone can only be looked at"
+        if "pose" in streams and "color" in streams:
+            advice = "record depth; of pictures with poses a splat can be learned: ingest, then scenewright splat build"
         add("wasted", "depth", f"there is no depth and no stereo pair with a baseline{why('depth')}", advice)
     elif "depth" not in streams:
         add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")

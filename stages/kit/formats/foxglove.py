@@ -17,6 +17,8 @@ from scenewright.stages.kit.geometry.transforms import quaternion_of, transform_
 
 JPEG_QUALITY = 95
 """JPEG quality of colour images in a sequence."""
+DEVIATION_STEP = 1e-4
+"""Unit of the deviation of depth in a sequence [m]."""
 JPEG_START = b"\xff\xd8\xff"
 PNG_START = b"\x89PNG\r\n\x1a\n"
 RAW_TYPES: dict[str, tuple[np.dtype[Any], int]] = {
@@ -79,6 +81,23 @@ def millimetres_to_depth(millimetres: np.ndarray) -> np.ndarray:
     depth = millimetres.astype(np.float32) / np.float32(1000)
     depth[millimetres == 65535] = 0
     return depth
+
+
+def deviation_to_steps(deviation: np.ndarray) -> np.ndarray:
+    """Return uint16 steps of 0.1 mm of float metres: at least one where it is known, 0 where it is 0 or NaN.
+
+    Over 6.5535 m it is that much. Raises ValueError for a negative one.
+    """
+    metres = np.nan_to_num(np.asarray(deviation, dtype=np.float32), nan=0.0)
+    if metres.size and metres.min() < 0:
+        raise ValueError(f"deviation of {metres.min():g} m is negative")
+    steps = np.clip(np.rint(np.minimum(metres, np.float32(7)) / np.float32(DEVIATION_STEP)), 1, 65535)
+    return np.where(metres > 0, steps, np.float32(0)).astype("<u2")
+
+
+def steps_to_deviation(steps: np.ndarray) -> np.ndarray:
+    """Return float32 metres of uint16 steps of 0.1 mm; 0 stays 0 = unknown."""
+    return steps.astype(np.float32) * np.float32(DEVIATION_STEP)
 
 
 def color_message(time: int, encoded: bytes, frame_id: str) -> CompressedImage:

@@ -21,7 +21,7 @@ MESSAGE_TYPES: dict[str, Any] = {
     "right": CompressedImage,
     "depth": RawImage,
     "labels": RawImage,
-    "confidence": RawImage,
+    "deviation": RawImage,
     "picture": CompressedImage,
     "calibration": CameraCalibration,
     "right_calibration": CameraCalibration,
@@ -30,9 +30,7 @@ MESSAGE_TYPES: dict[str, Any] = {
 """Last part of the topic -> message type; the first part is the camera."""
 CAMERA_NAME = re.compile(r"[A-Za-z0-9_]+")
 TOPIC = re.compile(rf"/({CAMERA_NAME.pattern})/({'|'.join(MESSAGE_TYPES)})")
-PIXEL_STREAMS = ("color", "depth", "labels", "right", "confidence", "picture")
-MOST_CONFIDENT = 2
-"""Largest value of the confidence of a depth pixel, as ARKit gives it: 0 is low."""
+PIXEL_STREAMS = ("color", "depth", "labels", "right", "deviation", "picture")
 
 
 def camera_of(message: Any, path: Path) -> Camera:

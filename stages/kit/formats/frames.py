@@ -3,9 +3,10 @@
 Topics of a camera called `camera`: `/camera/color` CompressedImage (JPEG or PNG), `/camera/depth` RawImage 16UC1 [mm],
 `/camera/labels` RawImage mono16, `/camera/calibration` CameraCalibration, and of a rectified stereo pair
 `/camera/right` CompressedImage with `/camera/right_calibration`, whose P holds the baseline. Beside them may stand
-`/camera/confidence` RawImage mono8 (0 low, 1 medium, 2 high) and `/camera/picture` CompressedImage, the colour at its
-full size, with `/camera/picture_calibration`. Other cameras have topics under their own name. `/tf` FrameTransforms
-world -> camera. All messages of a frame carry the frame's time as log time and header stamp, which no other frame has.
+`/camera/deviation` RawImage mono16, the standard deviation of depth [0.1 mm, 0 unknown], and `/camera/picture`
+CompressedImage, the colour at its full size, with `/camera/picture_calibration`. Other cameras have topics under their
+own name. `/tf` FrameTransforms world -> camera. All messages of a frame carry the frame's time as log time and header
+stamp, which no other frame has.
 Metadata record `scenewright`: what is known of the world frame; metadata record `labels`: instance -> class name.
 """
 
@@ -33,7 +34,6 @@ from scenewright.stages.kit.formats.frame_streams import (
     CAMERA_NAME,
     LABELS_METADATA,
     MESSAGE_TYPES,
-    MOST_CONFIDENT,
     PIXEL_STREAMS,
     TOPIC,
     TRANSFORMS,
@@ -63,8 +63,8 @@ class Frame:
     camera_name: str = CAMERA_FRAME
     right: np.ndarray | None = None
     """(H, W, 3) uint8 RGB: right eye of a rectified stereo pair."""
-    confidence: np.ndarray | None = None
-    """(H, W) uint8 0..2: how far depth is to be believed."""
+    deviation: np.ndarray | None = None
+    """(H, W) float32 [m]: standard deviation of depth, 0 = unknown."""
     picture: np.ndarray | None = None
     """(H', W', 3) uint8 RGB: the colour at its full size, of the camera in `FrameReader.picture_cameras`."""
 
@@ -73,10 +73,10 @@ class FrameWriter:
     """Writes frames in time order. Used as a context manager; a file that was left by an exception stays unfinished.
 
     `camera` is the camera of frames that name none; `cameras` (name -> camera) are those of frames that do, and
-    `baselines` (name -> metres) those of stereo pairs. `labels` announces a label stream, `confidence` one of
-    confidence, `picture_cameras` (name -> camera) pictures at their full size. `world_up="z"` records that z of the
-    poses' world is up (what our generated logs know); `"unknown"` records that it is not known. `registered` records
-    whether colour and depth pixels see the same ray. `label_table` says what the labels mean.
+    `baselines` (name -> metres) those of stereo pairs. `labels` announces a label stream, `deviation` one of
+    the deviation of depth, `picture_cameras` (name -> camera) pictures at their full size. `world_up="z"` records that
+    z of the poses' world is up (what our generated logs know); `"unknown"` records that it is not known. `registered`
+    records whether colour and depth pixels see the same ray. `label_table` says what the labels mean.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class FrameWriter:
         label_table: Iterable[LabelEntry] = (),
         cameras: Mapping[str, Camera] | None = None,
         baselines: Mapping[str, float] | None = None,
-        confidence: bool = False,
+        deviation: bool = False,
         picture_cameras: Mapping[str, Camera] | None = None,
     ) -> None:
         self.camera = camera
@@ -101,7 +101,7 @@ class FrameWriter:
             if not CAMERA_NAME.fullmatch(name):
                 raise ValueError(f"camera name {name!r} is not made of letters, digits and underscores")
         self.frame_count = 0
-        self._labels, self._confidence = labels, confidence
+        self._labels, self._deviation = labels, deviation
         self._last_time = -1
         self._file = Path(path).open("wb")  # noqa: SIM115 (closed in __exit__)
         self._writer = McapWriter(self._file, chunk_size=1 << 20, compression=CompressionType.ZSTD)
@@ -112,7 +112,7 @@ class FrameWriter:
             announced = (
                 *("color", "depth", *(("labels",) if labels else ()), "calibration"),
                 *(("right", "right_calibration") if name in self.baselines else ()),
-                *(("confidence",) if confidence else ()),
+                *(("deviation",) if deviation else ()),
                 *(("picture", "picture_calibration") if name in self.picture_cameras else ()),
             )
             for stream in announced:
@@ -150,7 +150,7 @@ class FrameWriter:
         labels: np.ndarray | None = None,
         *,
         right: np.ndarray | bytes | None = None,
-        confidence: np.ndarray | None = None,
+        deviation: np.ndarray | None = None,
         picture: np.ndarray | bytes | None = None,
         camera_name: str | None = None,
     ) -> None:
@@ -158,8 +158,9 @@ class FrameWriter:
 
         `color` and `right` are (H, W, 3) uint8 RGB, or JPEG or PNG bytes that are stored as they are, and so is
         `picture`, at its own size; `depth` is (H, W) float [m] (0, NaN, infinite and over 65.534 m are invalid) or
-        uint16 [mm]; `labels` is (H, W) integer < 65536, `confidence` (H, W) uint8 0..2; `world_from_camera` is (4, 4)
-        rigid. Raises ValueError for a wrong shape, time, camera or pose.
+        uint16 [mm]; `labels` is (H, W) integer < 65536; `deviation` is (H, W) float [m] (0 and NaN are unknown, over
+        6.5535 m is that much); `world_from_camera` is (4, 4) rigid. Raises ValueError for a wrong shape, time, camera
+        or pose.
         """
         name = camera_name or next(iter(self.cameras))
         if name not in self.cameras:
@@ -193,13 +194,12 @@ class FrameWriter:
             if labels.size and (labels.min() < 0 or labels.max() > 65535):
                 raise ValueError("labels are not within 0..65535")
             messages.append((f"/{name}/labels", foxglove.raw_message(stamp, labels, "mono16", name)))
-        if confidence is not None:
-            if not self._confidence:
-                raise ValueError("confidence was not announced: FrameWriter(..., confidence=True)")
-            self._check(confidence, camera, "confidence", (), np.uint8)
-            if confidence.max(initial=0) > MOST_CONFIDENT:
-                raise ValueError(f"confidence is not within 0..{MOST_CONFIDENT}")
-            messages.append((f"/{name}/confidence", foxglove.raw_message(stamp, confidence, "mono8", name)))
+        if deviation is not None:
+            if not self._deviation:
+                raise ValueError("deviation was not announced: FrameWriter(..., deviation=True)")
+            self._check(deviation, camera, "deviation", (), None)
+            steps = foxglove.deviation_to_steps(deviation)
+            messages.append((f"/{name}/deviation", foxglove.raw_message(stamp, steps, "mono16", name)))
         if picture is not None:
             if name not in self.picture_cameras:
                 raise ValueError(f"camera {name!r} has no pictures: FrameWriter(..., picture_cameras=...)")
@@ -382,7 +382,9 @@ class FrameReader:
             pixels = foxglove.raw_array(message)
             if stream == "depth":
                 return foxglove.millimetres_to_depth(pixels)
-            return pixels.astype(np.uint8 if stream == "confidence" else np.uint16, copy=False)
+            if stream == "deviation":
+                return foxglove.steps_to_deviation(pixels)
+            return pixels.astype(np.uint16, copy=False)
         except ValueError as error:
             raise BadInput(f"{self.path}: {stream} of frame {index}: {error}") from None
 

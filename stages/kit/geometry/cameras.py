@@ -39,3 +39,24 @@ def scaled(camera: Camera, factor: float) -> Camera:
         cx=(camera.cx + 0.5) * factor - 0.5,
         cy=(camera.cy + 0.5) * factor - 0.5,
     )
+
+
+def seen_by(image: np.ndarray, source: Camera, target: Camera) -> np.ndarray:
+    """Return an image (H, W, ...) of one camera as another at its place, turned like it, sees it (H', W', ...): the
+    nearest pixel counts, 0 where the first saw nothing."""
+    columns = _looked_up(target.width, target.fx, target.cx, source.fx, source.cx)
+    rows = _looked_up(target.height, target.fy, target.cy, source.fy, source.cy)
+    inside = np.logical_and.outer((rows >= 0) & (rows < source.height), (columns >= 0) & (columns < source.width))
+    found = image[np.clip(rows, 0, source.height - 1)[:, None], np.clip(columns, 0, source.width - 1)]
+    return np.where(inside.reshape(*inside.shape, *(1,) * (image.ndim - 2)), found, np.zeros((), image.dtype))
+
+
+def boxes_seen_by(boxes: np.ndarray, source: Camera, target: Camera) -> np.ndarray:
+    """Return boxes (N, 4) x0 y0 x1 y1 [pixel] in the image of one camera in that of another at its place."""
+    factors = np.array([target.fx / source.fx, target.fy / source.fy] * 2)
+    return (boxes - [source.cx, source.cy] * 2) * factors + [target.cx, target.cy] * 2
+
+
+def _looked_up(count: int, focal: float, center: float, source_focal: float, source_center: float) -> np.ndarray:
+    """Return the nearest pixel of another camera along one axis, of each of `count` pixels."""
+    return np.rint((np.arange(count) - center) / focal * source_focal + source_center).astype(int)

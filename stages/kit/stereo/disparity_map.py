@@ -32,3 +32,9 @@ def depth_of(disparity: np.ndarray, camera: Camera, baseline: float) -> np.ndarr
     depth = np.zeros(disparity.shape, np.float32)
     depth[positive] = camera.fx * baseline / disparity[positive]
     return depth
+
+
+def depth_deviation(depth: np.ndarray, deviation: np.ndarray, camera: Camera, baseline: float) -> np.ndarray:
+    """Return the standard deviation (H, W) float32 [m] of depth (H, W) [m] from disparities that have the standard
+    deviation `deviation` (H, W) [px]: dz = z^2 / (fx * baseline) dd. It is 0 where depth is."""
+    return (depth * depth * deviation / (camera.fx * baseline)).astype(np.float32)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.open_words.encoder import Encoder, unit
+from scenewright.stages.splat.views import sharpest
 
 MOST_LOOKS = 5
 """Squares of a region, those of most pixels."""
+WIDEST = 960
+"""Width of full pictures that are looked in [pixel]: those of the frames are taken as they are."""
 LEAST_SIDE = 12
 """Pixels of a square."""
 MARGIN = 1.25
@@ -35,6 +39,15 @@ class Sight:
     """(H, W) float32 [m], 0 unknown."""
     camera: Camera
     camera_from_world: np.ndarray
+
+
+def sight_of(reader: FrameReader, frame: Frame, depth: np.ndarray, camera_from_world: np.ndarray) -> Sight:
+    """Return a frame that has colour as a picture to look in, its full picture where it has one. `depth` (H, W) [m] is
+    of the frame."""
+    width = max(WIDEST, reader.cameras[frame.camera_name].width)
+    color, seen, camera = sharpest(reader, replace(frame, depth=depth), width)
+    assert seen is not None
+    return Sight(color, seen, camera, camera_from_world)
 
 
 @dataclass

@@ -119,6 +119,7 @@ ROWS = [
         )
     ),
     NotTried(STAGE, "up may be wrong", KNOWN_BY_TESTS),
+    NotTried(f"{PREFLIGHT}/inspection.py", "a splat can be learned", "tests of splats learn such ones"),
     NotTried(f"{PREFLIGHT}/page.py", "choose a writable --html", "root can write everywhere, as tests may"),
     *(
         NotTried(f"{PREFLIGHT}/steps.py", says, "a name of a step")

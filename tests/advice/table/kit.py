@@ -17,6 +17,7 @@ from scenewright.stages.kit.language.options import LanguageParameters
 from tests.advice.inputs import room
 from tests.advice.rows import NotTried, Tried
 from tests.unit.disparity.pairs import pair, write_folder
+from tests.unit.ingest.phone_writers import Take, write_r3d
 from tests.unit.language.chats import GOOD, QUESTION, SCHEMA, opened, scripted
 from tests.unit.language.stub_server import hangs_up, replies, serving, status
 
@@ -390,6 +391,15 @@ ROWS = [
     ),
     Tried(
         KIT + "simulation/world.py", "run `scenewright verify`", bad_urdf, "verify {golden}/interactive_scene", code=3
+    ),
+    Tried(
+        KIT + "needed.py",
+        "pip install 'scenewright[{}]'",
+        "ingest --log take.r3d --out out",
+        "ingest --log take.r3d --out out",
+        code=5,
+        lacks=("lzfse",),
+        given=lambda folder: write_r3d(folder / "take.r3d", Take(3)),
     ),
     Tried(KIT + "tasks/fast_downward.py", "pip install 'scenewright[planning-gpl]'", fast_downward, PLAN, code=5),
     Tried(KIT + "tasks/fast_downward.py", "take --planner builtin", plan_of_another_task, PLAN, code=3),

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.sequence import Sequence
+from scenewright.stages.ingest.folders.quarter_turns import OLD_FROM_TURNED
 from scenewright.stages.kit.formats.frames import FrameReader
 
 from tests.advice.rows import NotTried, Tried
 from tests.advice.table.fuse import scan
 from tests.unit.ingest.calibrations import CAMODOCAL
 from tests.unit.ingest.folder_writers import stamp_text, tum_line, write_image_folder, write_nerfstudio, write_tum
+from tests.unit.ingest.phone_writers import Take, write_stray_scanner
 from tests.unit.ingest.tiny_room import CAMERA, frames, png
 
 GIVEN = "--fx 80 --fy 80 --cx 47.5 --cy 35.5"
@@ -63,6 +65,19 @@ def images(folder: Path) -> None:
     (folder / "mine.tum").write_text("\n".join(lines) + "\n")
 
 
+def odd_stray(folder: Path) -> None:
+    """A recording without its video, of pictures that are not ARKit's usual ones."""
+    log = write_stray_scanner(folder / "log", Take(3), intrinsics=False)
+    (log / "rgb.mp4").unlink()
+
+
+def upright_phone(folder: Path) -> None:
+    """A recording of a phone that was held upright: its pictures lie on their side."""
+    take = Take(3)
+    take.world_from_camera = take.world_from_camera @ OLD_FROM_TURNED.T
+    write_stray_scanner(folder / "log", take)
+
+
 def room_scan(folder: Path) -> None:
     for ending in ("ply", "obj"):
         scan(f"scan.{ending}")(folder)
@@ -87,6 +102,11 @@ def all_are_posed(folder: Path) -> None:
     with FrameReader(folder / "out/frames.mcap") as reader:
         poses = [frame.world_from_camera for frame in reader.frames(streams=())]
     assert info.frame_count == info.frames_in_log and all(pose is not None for pose in poses)
+
+
+def sizes(folder: Path, size: tuple[int, int]) -> None:
+    camera = Sequence(folder / "out").info.camera
+    assert (camera.width, camera.height) == size
 
 
 def refused(path: str, says: str, given, code: int = 3) -> Tried:  # type: ignore[no-untyped-def]
@@ -144,15 +164,27 @@ ROWS = [
     *(
         NotTried(FOREIGN, says, ANOTHER)
         for says in (
-            *("azure_kinect_mkv_reader", "export it as EXR", "rtabmap-export --images", "export_svo.py"),
-            *(
-                "export the scan as PLY",
-                "ns-process-data aria",
-                "create_rosbag.py",
-                "record3d --data {}",
-                "polycam --data",
-            ),
+            *("azure_kinect_mkv_reader", "rtabmap-export --images --poses_camera", "export_svo.py"),
+            *("export the scan as PLY", "ns-process-data aria"),
         )
+    ),
+    Tried(
+        "stages/ingest/layouts/stray_scanner/reader.py",
+        "of the depth, or put the app's own",
+        LOG,
+        f"{LOG} --fx 42.7 --fy 42.8 --cx 32.1 --cy 23.2",
+        code=3,
+        given=odd_stray,
+        right=all_are_posed,
+    ),
+    Tried(
+        "stages/ingest/folders/phone_frames.py",
+        "--no-turn leaves them",
+        LOG,
+        f"{LOG} --no-turn --force",
+        code=0,
+        given=upright_phone,
+        right=lambda folder: sizes(folder, (64, 48)),
     ),
     Tried(
         "stages/ingest/own_poses.py",

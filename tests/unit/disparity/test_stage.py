@@ -12,6 +12,7 @@ import pytest
 from scenewright.schemas.disparity import Disparity
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import Sequence
+from scenewright.stages.disparity.consistency import deviation_of
 from scenewright.stages.disparity.parameters import DisparityParameters, check_inputs
 from scenewright.stages.ingest.preflight.steps import step_reports
 from scenewright.stages.kit.formats.disparity_file import DisparityReader
@@ -38,9 +39,10 @@ def test_the_artifact_is_a_sequence_with_the_depth_of_its_disparities(made: Disp
     assert made.outcome == "ok" and made.summary["frames"] == 2 and isinstance(made, Sequence)
     require_depth(made)
     info = made.info
-    assert info.streams == ("color", "depth") and info.frame_count == 2 and info.cameras[0].baseline is None
+    assert info.streams == ("color", "depth", "deviation")
+    assert info.frame_count == 2 and info.cameras[0].baseline is None
     with FrameReader(made.path("frames.mcap")) as reader, DisparityReader(made.path("disparity.mcap")) as maps:
-        frame, found = reader.read(0), maps.read(int(reader.stamps[0]))
+        frame, found = reader.read(0, ("color", "depth", "deviation")), maps.read(int(reader.stamps[0]))
     assert frame.depth is not None and frame.color is not None
     known = (frame.depth > 0) & SEEN
     assert known.mean() > 0.5
@@ -48,6 +50,11 @@ def test_the_artifact_is_a_sequence_with_the_depth_of_its_disparities(made: Disp
     assert np.median(np.abs(error[known])) < 0.04
     sure = found.confidence >= made.matching.minimum_confidence
     np.testing.assert_array_equal(frame.depth > 0, found.known & sure)
+    assert frame.deviation is not None
+    np.testing.assert_array_equal(frame.deviation > 0, frame.depth > 0)
+    expected = frame.depth**2 / (CAMERA.fx * BASELINE) * deviation_of(found.confidence)
+    np.testing.assert_allclose(frame.deviation, expected, rtol=0.02, atol=1e-3)
+    assert np.mean(np.abs(error)[known] < 2 * frame.deviation[known]) > 0.95
 
 
 def test_its_record_says_what_was_searched_and_found(made: Disparity) -> None:

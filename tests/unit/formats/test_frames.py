@@ -187,27 +187,30 @@ def test_cameras_need_plain_names(tmp_path: Path) -> None:
         FrameWriter(tmp_path / "a", CAMERA, cameras={"../x": CAMERA})
 
 
-def test_confidence_and_pictures_at_their_full_size(tmp_path: Path) -> None:
+def test_deviation_and_pictures_at_their_full_size(tmp_path: Path) -> None:
     full = Camera(width=120, height=90, fx=150.0, fy=153.0, cx=59.5, cy=44.5)
-    path, grain = tmp_path / "frames.mcap", np.arange(1200, dtype=np.uint8).reshape(30, 40) % 3
+    path, deviation = tmp_path / "frames.mcap", np.arange(1200, dtype=np.float32).reshape(30, 40) / 1000
     picture = cv2.imencode(".png", np.full((90, 120, 3), 9, np.uint8))[1].tobytes()
     depth = np.full((30, 40), 2.0, np.float32)
-    with FrameWriter(path, CAMERA, confidence=True, picture_cameras={"camera": full}) as writer:
-        writer.write(1.0, None, depth, confidence=grain, picture=picture)
+    deviation[0, 1:5] = 1e-6, np.nan, np.inf, 7.0
+    with FrameWriter(path, CAMERA, deviation=True, picture_cameras={"camera": full}) as writer:
+        writer.write(1.0, None, depth, deviation=deviation, picture=picture)
         writer.write(2.0, None, depth)
         for wrong, reason in (
-            ({"confidence": grain + 1}, "0..2"),
+            ({"deviation": deviation - 1}, "negative"),
+            ({"deviation": deviation[1:]}, "shape"),
             ({"picture": np.zeros((30, 40, 3), np.uint8)}, "shape"),
         ):
             with pytest.raises(ValueError, match=reason):
                 writer.write(3.0, None, depth, **wrong)
     with FrameReader(path) as reader:
-        assert reader.streams == ("depth", "confidence", "picture")
+        assert reader.streams == ("depth", "deviation", "picture")
         assert reader.cameras == {"camera": CAMERA} and reader.picture_cameras == {"camera": full}
-        first, second = reader.frames(("depth", "confidence", "picture"))
-        assert first.confidence.dtype == np.uint8 and first.picture.shape == (90, 120, 3)
-        np.testing.assert_array_equal(first.confidence, grain)
+        first, second = reader.frames(("depth", "deviation", "picture"))
+        assert first.deviation.dtype == np.float32 and first.picture.shape == (90, 120, 3)
+        np.testing.assert_allclose(first.deviation[1:], deviation[1:], atol=5e-8)
+        np.testing.assert_allclose(first.deviation[0, :6], [0, 1e-4, 0, 6.5535, 6.5535, 0.005])
         assert (first.picture == 9).all() and reader.encoded(0, "picture") == picture
-        assert second.confidence is None and second.picture is None
-    with FrameWriter(tmp_path / "plain", CAMERA) as writer, pytest.raises(ValueError, match="confidence=True"):
-        writer.write(1.0, None, depth, confidence=grain)
+        assert second.deviation is None and second.picture is None
+    with FrameWriter(tmp_path / "plain", CAMERA) as writer, pytest.raises(ValueError, match="deviation=True"):
+        writer.write(1.0, None, depth, deviation=deviation)

@@ -69,6 +69,28 @@ def test_noise_averages_out() -> None:
     assert error.mean() < 0.002, "mean surface error at 2 cm voxels"
 
 
+def test_depth_weighs_by_the_inverse_of_its_variance() -> None:
+    depth = np.full((CAMERA.height, CAMERA.width), 1.5, np.float32)
+    blocks = VoxelBlocks(VOXEL)
+    for nearer, deviation in ((0.0, 0.01), (0.02, 0.04)):
+        integrate(
+            blocks, depth + np.float32(nearer), CAMERA, np.eye(4), **LIMITS, deviation=np.full_like(depth, deviation)
+        )
+    surface = extract_surface(blocks, minimum_weight=0.1)
+    assert blocks.weight.max() == pytest.approx(1.25), "0.02 m or less weighs 1, 0.04 m a quarter"
+    assert np.median(surface.vertices[:, 2]) == pytest.approx(1.5 + 0.02 * 0.25 / 1.25, abs=2e-4)
+
+
+def test_unknown_deviations_change_nothing_and_large_ones_are_no_hits() -> None:
+    frames = [(render(SCENE, pose)[0], pose) for pose in orbit(2)]
+    unknown = np.zeros((CAMERA.height, CAMERA.width), np.float32)
+    plain, same, unsure = fused(frames), fused(frames, deviation=unknown), fused(frames, deviation=unknown + 0.1)
+    for name in ("tsdf", "weight", "hits"):
+        assert getattr(plain, name).tobytes() == getattr(same, name).tobytes()
+    assert plain.hits.max() > 0 and unsure.hits.max() == 0
+    assert 0 < unsure.weight.max() < 0.1
+
+
 def plain_integrate(
     state: dict[tuple[int, int, int], dict[str, float]],
     voxels: np.ndarray,

@@ -385,6 +385,7 @@ def test_video_in_a_compressed_image() -> None:
         ("32FC1", "/camera/depth_registered/image", "depth"),
         ("32FC1", "/anything", "depth"),
         ("32FC1", "/stereo/disparity/image", "other"),
+        ("mono16", "/camera/deviation", "other"),
         ("mono16", "/camera/depth", "depth"),
         ("mono16", "/device_0/sensor_0/Depth_0/image/data", "depth"),
         ("mono16", "/camera/ir/image_raw", "color"),

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.folders.camera_groups import CameraGroup, grouped
+from scenewright.stages.ingest.folders.exr_depth import require_exr
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     DEPTH_SUFFIXES,
@@ -23,11 +24,10 @@ from scenewright.stages.ingest.folders.files import (
     named_file,
     natural_key,
     pinhole,
-    refuse_exr,
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader, kept_pictures, picture_camera
 from scenewright.stages.ingest.folders.undistortion import PINHOLE, RecordedCamera, lens_of, overridden_recording
 from scenewright.stages.ingest.layouts.colmap.model import ModelCamera, ModelImage, SparseModel, has_model, read_model
 from scenewright.stages.ingest.parameters import IngestParameters
@@ -71,7 +71,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         raise BadInput(f"{model.folder}: no image is registered in the model", hint="COLMAP did not find any pose")
     colors = [named_file(image_folder, image.name, str(model.folder)) for image in images]
     depths, depth_words = _depths(root, images)
-    refuse_exr((path.name for path in depths if path), str(root))
+    require_exr(path.name for path in depths if path)
     has_depth = depth_words is not None
     has_color = not has_depth or any(path.is_file() for path in colors)
     recorded, notes_of_options = _recorded_cameras(model, images, colors, depths, parameters)
@@ -83,6 +83,10 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         depth_form(parameters, 1.0) if depth_words == DENSE_MAPS else depth_form(parameters, 1000.0, depths)
     )
     group_of = {index: group for group in groups for index in group.members}
+    pictures = {
+        group.name: kept_pictures((colors[k] for k in group.members), group.camera) if has_depth else None
+        for group in groups
+    }
     entries = []
     ordered: list[tuple[str, int | None]] = [(image.name, index) for index, image in enumerate(images)]
     ordered += [(path.relative_to(image_folder).as_posix(), None) for path in unregistered]
@@ -92,7 +96,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             files = FrameFiles(image_folder / name)
             entries.append(Entry(name, time, None, _never, "missing_pose", chosen[0], files))
         elif group_of[index].name in chosen:
-            form = FrameFormat(recorded[index], group_of[index].camera, has_color, has_depth, stored)
+            group = group_of[index]
+            form = FrameFormat(recorded[index], group.camera, has_color, has_depth, stored, pictures[group.name])
             files = FrameFiles(colors[index], depths[index])
             pose = images[index].world_from_camera
             problem = "non_rigid_pose" if pose is None else None
@@ -118,7 +123,10 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     return LogSource(
         "colmap",
         rule,
-        tuple(SourceCamera(group.name, group.camera) for group in _in_order(groups, chosen)),
+        tuple(
+            SourceCamera(group.name, group.camera, picture=picture_camera(group.camera, pictures[group.name]))
+            for group in _in_order(groups, chosen)
+        ),
         tuple(entries),
         notes,
         streams=tuple(streams),

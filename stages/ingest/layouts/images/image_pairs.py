@@ -16,7 +16,7 @@ from scenewright.stages.ingest.folders.files import (
     images_by_stem,
     natural_key,
 )
-from scenewright.stages.ingest.layouts.images.video_frames import SUFFIXES as VIDEO_SUFFIXES
+from scenewright.stages.ingest.folders.video_frames import SUFFIXES as VIDEO_SUFFIXES
 
 STEREO_FOLDERS = (
     ("left", "right"),

@@ -18,6 +18,7 @@ from scenewright.stages.ingest.clocks import in_file_order, order_note, stamps_p
 from scenewright.stages.ingest.folders.calibration_files import FolderCalibration
 from scenewright.stages.ingest.folders.calibration_search import NAMES as CALIBRATION_NAMES
 from scenewright.stages.ingest.folders.calibration_search import calibration_of, find_calibration, refuse_several
+from scenewright.stages.ingest.folders.exr_depth import require_exr
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
@@ -26,16 +27,15 @@ from scenewright.stages.ingest.folders.files import (
     depth_image_size,
     file_bytes,
     raw_depth,
-    refuse_exr,
     stream,
     text_stream,
 )
 from scenewright.stages.ingest.folders.pose_files import Pose, columns_of, pose_file, read_pose_list
 from scenewright.stages.ingest.folders.stamped_poses import StampedPoses, coverage_notes
+from scenewright.stages.ingest.folders.video_frames import VideoFrames
 from scenewright.stages.ingest.foreign import unread_tables
 from scenewright.stages.ingest.images import DepthForm, decode_as_calibrated, depth_millimetres, usable_color
 from scenewright.stages.ingest.layouts.images.image_pairs import FolderImages, find_images, has_images, stamps_of
-from scenewright.stages.ingest.layouts.images.video_frames import VideoFrames
 from scenewright.stages.ingest.lenses import Lens, lens_of
 from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.ingest.parameters import IngestParameters
@@ -88,7 +88,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         raise BadInput(f"{root}: holds no images in color/, left/ and right/, or with names that say what they are")
     video = VideoFrames(images.video) if images.video else None
     names = images.names if video is None else tuple(f"frame {index}" for index in range(video.count))
-    refuse_exr((path.name for path in images.depths if path), str(root))
+    require_exr(path.name for path in images.depths if path)
     has_depth = any(images.depths)
     calibration = _calibration(root, images, parameters)
     size = _size(images, video, has_depth, (calibration.left.width, calibration.left.height))

@@ -17,6 +17,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import opened
 from scenewright.stages.ingest.folders.camera_groups import grouped
+from scenewright.stages.ingest.folders.exr_depth import require_exr
 from scenewright.stages.ingest.folders.files import (
     COLOR_SUFFIXES,
     all_intrinsics_given,
@@ -28,11 +29,10 @@ from scenewright.stages.ingest.folders.files import (
     natural_key,
     pinhole,
     read_json,
-    refuse_exr,
     stream,
     text_stream,
 )
-from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader
+from scenewright.stages.ingest.folders.frame_loading import FrameFormat, frame_loader, kept_pictures, picture_camera
 from scenewright.stages.ingest.folders.undistortion import PINHOLE, Lens, RecordedCamera, lens_of, overridden_recording
 from scenewright.stages.ingest.layouts.nerfstudio import replica
 from scenewright.stages.ingest.parameters import IngestParameters
@@ -45,6 +45,8 @@ OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 """Turns the camera axes of OpenCV into those of OpenGL: y and z change sign."""
 DEFAULT_UNIT = 0.001
 """Metres per unit of depth when the file does not say: millimetres."""
+UNIT_KEYS = ("depth_unit_scale_factor", "integer_depth_scale")
+"""Metres per unit: nerfstudio's word, and that of instant-ngp and NeRFCapture, who call the file `depth_path`."""
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL")
 LARGEST_SIZE = 100_000
 """Largest width or height of a camera [px]; a bound against damaged files."""
@@ -105,11 +107,12 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         frames.sort(key=lambda frame: frame.time or 0.0)
     has_depth = any(frame.depth is not None for frame in frames)
     has_color = not has_depth or any(frame.color is not None and frame.color.is_file() for frame in frames)
-    refuse_exr((frame.depth.name for frame in frames if frame.depth is not None), str(file))
-    default_unit = _number(document, "depth_unit_scale_factor", str(file), DEFAULT_UNIT)
+    require_exr(frame.depth.name for frame in frames if frame.depth is not None)
+    unit_key = next((key for key in UNIT_KEYS if key in document), UNIT_KEYS[0])
+    default_unit = _number(document, unit_key, str(file), DEFAULT_UNIT)
     if not default_unit > 0:
-        raise BadInput(f"{file}: depth_unit_scale_factor {default_unit:g} is not positive")
-    unstated = [] if "depth_unit_scale_factor" in document else [frame.depth for frame in frames]
+        raise BadInput(f"{file}: {unit_key} {default_unit:g} is not positive")
+    unstated = [] if unit_key in document else [frame.depth for frame in frames]
     stored, unit_note = depth_form(parameters, 1 / default_unit, unstated)
     recorded, notes_of_options = _recorded_cameras(frames, has_depth, parameters)
     groups, group_notes = grouped(recorded, _labels(frames, recorded))
@@ -117,12 +120,16 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     chosen = chosen_cameras(counts, parameters, str(file)) if counts else ()
     world, world_notes = _world_from_saved(document, file, has_depth)
     group_of = {index: group for group in groups for index in group.members}
+    pictures = {
+        group.name: kept_pictures((frames[k].color for k in group.members), group.camera) if has_depth else None
+        for group in groups
+    }
     entries = []
     for index, frame in enumerate(frames):
         group = group_of[index]
         if group.name not in chosen:
             continue
-        form = FrameFormat(recorded[index], group.camera, has_color, has_depth, stored)
+        form = FrameFormat(recorded[index], group.camera, has_color, has_depth, stored, pictures[group.name])
         files = FrameFiles(frame.color, frame.depth)
         pose = None if frame.pose is None else world(frame.pose)
         time = index / parameters.frame_rate if frame.time is None or not stamped else frame.time
@@ -130,7 +137,11 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         entries.append(
             Entry(frame.name, time, pose, frame_loader(files, form), frame.problem, group.name, files, stamp)
         )
-    cameras = [SourceCamera(group.name, group.camera) for group in groups if group.name in chosen]
+    cameras = [
+        SourceCamera(group.name, group.camera, picture=picture_camera(group.camera, pictures[group.name]))
+        for group in groups
+        if group.name in chosen
+    ]
     if not cameras:
         raise BadInput(f"{file}: has no frames")
     lenses = sorted({recording.lens.words for recording in recorded if not recording.lens.is_pinhole})
@@ -180,6 +191,8 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
         if not isinstance(fields, dict):
             raise BadInput(f"{where}: is no object")
         depth = fields.get("depth_file_path")
+        if depth is None and (root / str(fields.get("depth_path"))).is_file():  # NeRFCapture names files it never wrote
+            depth = fields["depth_path"]
         named_path = fields.get("file_path")
         color = None if named_path is None and depth is not None else _with_suffix(named_file(root, named_path, where))
         pose, problem = _pose(fields.get("transform_matrix"))

@@ -76,13 +76,14 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     calibration = _calibration(path, depth_image_size(depths.values()), color_image_size(colors.values()))
     camera, notes_of_options = overridden(calibration.depth, parameters)
     form, unit_note = depth_form(parameters, calibration.units_per_metre)
+    kept = calibration.color if colors and calibration.identity and calibration.color.width > camera.width else None
     entries = []
     for number in sorted(colors.keys() | depths.keys()):
         pose, problem = _pose(poses.get(number))
         color_camera = calibration.color if colors else None
         load = _loader(colors.get(number), depths.get(number), color_camera, camera, form)
         if color_camera is not None and calibration.color != camera:
-            load = registered_loader(load, camera, calibration.color, np.eye(4))
+            load = registered_loader(load, camera, calibration.color, np.eye(4), keep=kept is not None)
         files = FrameFiles(colors.get(number), depths.get(number))
         entries.append(Entry(f"frame {number}", number / parameters.frame_rate, pose, load, problem, files=files))
     stray = len(poses.keys() - colors.keys() - depths.keys())
@@ -98,7 +99,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         stream("depth", "depth", depths.values()),
         text_stream("pose", "pose", len(poses)),
     )
-    cameras = (SourceCamera("camera", camera, registered=calibration.identity),)
+    cameras = (SourceCamera("camera", camera, registered=calibration.identity, picture=kept),)
     return LogSource("scannet", rule, cameras, tuple(entries), notes, streams=streams)
 
 

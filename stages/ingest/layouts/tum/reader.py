@@ -19,6 +19,7 @@ from scenewright.stages.ingest.clocks import in_file_order, order_note, stamps_p
 from scenewright.stages.ingest.folders.calibration_files import read_calibration
 from scenewright.stages.ingest.folders.calibration_search import calibration_of, refuse_several
 from scenewright.stages.ingest.folders.depth_units import settled_units
+from scenewright.stages.ingest.folders.exr_depth import require_exr
 from scenewright.stages.ingest.folders.files import (
     all_intrinsics_given,
     camera_from_options,
@@ -27,7 +28,6 @@ from scenewright.stages.ingest.folders.files import (
     depth_image_size,
     named_file,
     pinhole,
-    refuse_exr,
     stream,
     text_stream,
 )
@@ -95,7 +95,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     # ICL-NUIM numbers its frames where TUM has stamps.
     unit = 1 / parameters.frame_rate if icl_nuim else 1.0
     colors, depths = _images(root, unit)
-    refuse_exr((path.name for path in depths.paths), str(root))
+    require_exr(path.name for path in depths.paths)
     listed: list[tuple[str, Role, _Stamped]] = [("rgb", "color", colors), ("depth", "depth", depths)]
     poses = _poses(root, unit)
     size = depth_image_size(depths.paths) if depths.paths else color_image_size(colors.paths)

@@ -6,7 +6,8 @@ import numpy as np
 from scenewright.schemas.errors import MissingDependency
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary, load_vocabulary
 from scenewright.stages.kit.class_extents import extent_of, is_plausible
-from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.formats.frames import Frame, FrameReader
+from scenewright.stages.kit.geometry.cameras import boxes_seen_by
 from scenewright.stages.segment.backends.detector.agreement import HEARD, Thing, witnessed
 from scenewright.stages.segment.backends.detector.box_masks import box_mask, frame_geometry
 from scenewright.stages.segment.backends.detector.yolox import Detections, Detector
@@ -31,10 +32,11 @@ class DetectorBackend:
     """Detector boxes combined with geometric segments. What bounds the room is for `fuse` to find."""
 
     name = "detector"
-    streams: tuple[str, ...] = ("color", "depth")
+    streams: tuple[str, ...] = ("color", "depth", "picture")
 
     def __init__(
         self,
+        reader: FrameReader,
         vocabulary: Vocabulary,
         detector: Detector,
         *,
@@ -54,7 +56,7 @@ class DetectorBackend:
             for number, label in (witness.labels if witness else {}).items()
             if label.class_name
         }
-        self._detector = detector
+        self._detector, self._reader = detector, reader
         self._classes = [vocabulary.by_alias(name, "coco") for name in COCO_NAMES]
         self._anything = vocabulary.by_name(UNNAMED)
 
@@ -66,9 +68,9 @@ class DetectorBackend:
     def _things(self, frame: Frame, geometric: GeometricFrame) -> list[Thing]:
         assert frame.color is not None
         geometry = frame_geometry(geometric.labels, geometric.points, geometric.normals, frame.world_from_camera)
-        detections: Detections = self._detector.detect(frame.color)
+        detections, boxes = self._detected(frame)
         things = []
-        for box, score, number in zip(detections.boxes, detections.scores, detections.classes, strict=True):
+        for box, score, number in zip(boxes, detections.scores, detections.classes, strict=True):
             semantic = self._classes[int(number)]
             if semantic is None:
                 continue
@@ -89,6 +91,17 @@ class DetectorBackend:
             classes = self._witness.classify(frame.color)
             things = list(witnessed(things, classes, self._known, threshold=self._threshold, anything=self._anything))
         return merge_duplicates(things)
+
+    def _detected(self, frame: Frame) -> tuple[Detections, np.ndarray]:
+        """Return what is found in a frame's picture, in its colour where it has none, and the boxes (N, 4) in the
+        frame."""
+        if frame.picture is None:
+            assert frame.color is not None
+            found = self._detector.detect(frame.color)
+            return found, found.boxes
+        found = self._detector.detect(frame.picture)
+        picture, camera = self._reader.picture_cameras[frame.camera_name], self._reader.cameras[frame.camera_name]
+        return found, boxes_seen_by(found.boxes, picture, camera)
 
 
 def merge_duplicates(things: list[Thing]) -> list[Thing]:
@@ -142,14 +155,16 @@ def open_backend(request: BackendRequest) -> DetectorBackend:
         witness = open_segmenter(request.semantic_weights, device=request.device)
         score_threshold = HEARD * parameters.score_threshold
         label = f"detector {request.weights.stem}, witnessed by {request.semantic_weights.stem}, + geometric segments"
+    seen = next(iter(reader.picture_cameras.values()), reader.camera)
     detector = Detector(
         request.weights,
         score_threshold=score_threshold,
         suppression_overlap=parameters.suppression_overlap,
-        tile_side=min(reader.camera.width, reader.camera.height) if parameters.tiles is None else 0,
+        tile_side=min(seen.width, seen.height) if parameters.tiles is None else 0,
         tiles=parameters.tiles or 0,
     )
     return DetectorBackend(
+        reader,
         load_vocabulary(),
         detector,
         label=label,

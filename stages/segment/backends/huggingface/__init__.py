@@ -23,6 +23,7 @@ BACKEND = BackendDeclaration(
     summary="a panoptic or open-vocabulary model of the transformers library",
     order=60,
     needs=frozenset({"color"}),
+    of_pictures=True,
     weights="a model folder or hub id",
     parameters=HuggingFaceParameters,
     libraries=("transformers", "torch", "tokenizers", "pillow"),

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.declared import declared_in
 from scenewright.stages.kit.formats.frames import Frame
+from scenewright.stages.kit.geometry.cameras import seen_by
 from scenewright.stages.kit.labels import ANYTHING, Label, LabelSet, match_labels, read_label_file
 from scenewright.stages.segment.backends.masks import MasksParameters
 from scenewright.stages.segment.backends.masks.given import GivenFrame, MaskFormat, MaskSource, ReadSettings
@@ -51,7 +53,7 @@ class MasksBackend:
         sequence, reader = request.log()
         assert request.masks is not None  # segment.parameters.check
         options = request.own(MasksParameters)
-        self._root = request.masks
+        self._root, self._reader = request.masks, reader
         label_set = read_label_file(request.labels) if request.labels else None
         numbered = {label.id: label.name for label in label_set.labels if label.id is not None} if label_set else {}
         listing = Listing(request.masks, numbered)
@@ -104,8 +106,7 @@ class MasksBackend:
             return PanopticFrame(np.zeros((height, width), dtype=np.int32))
         least = pixels_at(self._settings[1], (height, width))
         try:
-            settings = ReadSettings(self._settings[0], least, self._behind)
-            masks = self._source.read(picture_index, (height, width), settings)
+            masks = self._read(picture_index, (height, width), frame.camera_name)
             segments = {number: segment for number, segment in self._named_segments(masks)}
         except BadInput as error:
             raise BadInput(f"frame {frame.index}: {error.message}", hint=error.hint) from None
@@ -117,6 +118,24 @@ class MasksBackend:
         ids = np.searchsorted(np.array([0, *numbers]), masks.ids).astype(np.int32)
         listed = {k: segments[number] for k, number in enumerate(numbers, start=1) if number in segments}
         return name_segments(ids, listed, self._vocabulary, minimum_pixels=least)
+
+    def _read(self, picture_index: int, shape: tuple[int, int], camera_name: str) -> GivenFrame:
+        """Return masks of the frame's size, or those of its full picture brought to it. Raises BadInput."""
+
+        def masks_of(size: tuple[int, int]) -> GivenFrame:
+            settings = ReadSettings(self._settings[0], pixels_at(self._settings[1], size), self._behind)
+            return self._source.read(picture_index, size, settings)
+
+        picture = self._reader.picture_cameras.get(camera_name)
+        try:
+            return masks_of(shape)
+        except BadInput:
+            if picture is None:
+                raise
+            with suppress(BadInput):
+                full = masks_of((picture.height, picture.width))
+                return replace(full, ids=seen_by(full.ids, picture, self._reader.cameras[camera_name]))
+            raise
 
     def _named_segments(self, frame_masks: GivenFrame) -> list[tuple[int, NamedSegment]]:
         segments = []

@@ -11,6 +11,7 @@ BACKEND = BackendDeclaration(
     summary="an ONNX instance, panoptic or semantic network",
     order=70,
     needs=frozenset({"color"}),
+    of_pictures=True,
     weights="an ONNX file",
     endings=(".onnx",),
     takes=frozenset({"tiles", "semantic_weights"}),

@@ -11,6 +11,7 @@ BACKEND = BackendDeclaration(
     order=65,
     apart=True,
     needs=frozenset({"color"}),
+    of_pictures=True,
     weights="a .tflite file",
     endings=(".tflite",),
     takes=frozenset({"tiles", "semantic_weights"}),
