@@ -16,13 +16,8 @@ import cv2
 import numba
 import numpy as np
 from pydantic import Field
-from scenewright.stages.disparity import match
-from scenewright.stages.disparity.consistency import deviation_of
-from scenewright.stages.fuse.integration import integrate
-from scenewright.stages.fuse.parameters import FuseParameters
-from scenewright.stages.fuse.smoothing import smoothed_tsdf
-from scenewright.stages.fuse.surface import Surface, extract_surface
-from scenewright.stages.fuse.voxel_blocks import VoxelBlocks
+from scenewright.stages.disparity import deviation_of, match
+from scenewright.stages.fuse import FuseParameters, Surface, VoxelBlocks, extract_surface, integrate, smoothed_tsdf
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.stage import Parameters

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from scenewright.stages.kit.exports import exported
 
 if TYPE_CHECKING:
+    from scenewright.stages.disparity.consistency import deviation_of
     from scenewright.stages.disparity.parameters import DisparityParameters
     from scenewright.stages.disparity.raft.checkpoint import load_network
     from scenewright.stages.disparity.raft.matching import SMALL_UPDATES, moved_right, open_raft

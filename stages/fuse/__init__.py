@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from scenewright.stages.fuse.parameters import FuseParameters
     from scenewright.stages.fuse.smoothing import smoothed_tsdf
     from scenewright.stages.fuse.stage import new_mapper, write_map
-    from scenewright.stages.fuse.surface import extract_surface
+    from scenewright.stages.fuse.surface import Surface, extract_surface
     from scenewright.stages.fuse.voxel_blocks import VoxelBlocks
 
 __getattr__ = exported(__name__)
