@@ -24,7 +24,8 @@ LEAST_DEPTH_SHARE = 0.03
 """A frame with depth on fewer of its pixels cannot be tracked."""
 GIVEN_TURN, GIVEN_WAY = math.radians(0.3), 0.01
 """Stated uncertainty of given poses: standard deviations that a metre of way adds, or a radian of turning, along each
-axis [rad and m]. Steps count as independent: over a hundred metres these make 3 degrees and 10 cm. By eye."""
+axis [rad and m]. Steps count as independent: over a hundred metres these make 3 degrees and 10 cm. So tight that depth
+that slides along a bare wall does not take the path with it; by eye."""
 SEARCH_ANGLES = (math.radians(8), math.radians(16))
 """Turns about each axis that are tried when nothing else helps."""
 
