@@ -74,7 +74,8 @@ def inspect(
             raise UsageError(f"--frames {frames}: a log is judged by its frames", hint="give at least 2")
         inspection = inspect_log(path, ingest_parameters(settings), frames, progress, keep_pictures=html is not None)
         inspection = replace(
-            inspection, report=inspection.report.model_copy(update={"command": _command(inspection.report, settings)})
+            inspection,
+            report=inspection.report.model_copy(update={"command": command_for(inspection.report, settings)}),
         )
         _show(inspection, html, json_output, {})
         return _exit_code(inspection.report, expect, inspection.report.verdict)
@@ -94,7 +95,7 @@ def inspect(
     return _exit_code(inspection.report, expect, artifact.outcome)
 
 
-def _command(report: Any, settings: Sequence[str]) -> str:
+def command_for(report: Any, settings: Sequence[str]) -> str:
     """Return the command that reconstructs the log with these options of ingest, ready to paste; empty where none can.
 
     Options that the pipeline has no variable for are left out.

@@ -280,12 +280,13 @@ def _judge_camera(
         )
     if motion is not None:
         findings += motion_findings(motion, outcome.report.verdict == "agree", name)
+    unregistered = registration_findings(registration, interval, name)
+    findings += unregistered
     drift = None
-    if poses is not None and outcome.report.verdict == "agree" and outcome.report.method == "depth":
+    if poses is not None and not unregistered and (outcome.report.verdict, outcome.report.method) == ("agree", "depth"):
         drift = drift_report(poses, looks)
     if drift is not None:
         findings += drift_findings(drift, name)
-    findings += registration_findings(registration, interval, name)
     if pictures is not None:
         findings += picture_findings(pictures, name)
     have = {
