@@ -72,8 +72,7 @@ def check(parameters: PosesParameters, inputs: Mapping[str, Any]) -> None:
     if parameters.method == "sfm" and not parameters.use_color:
         raise UsageError("--method sfm needs colour", hint="leave --no-use-color out, or use --method rgbd")
     if "features" in inputs and (parameters.method == "sfm" or not parameters.use_color):
-        why = "--method sfm has its own" if parameters.method == "sfm" else "colour is not used"
-        raise UsageError(f"--features: {why}", hint="leave --features out")
+        raise UsageError("--features needs colour, and --method rgbd or refine", hint="leave --features out")
 
 
 STAGE = Stage(
