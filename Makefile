@@ -151,6 +151,11 @@ house: setup ## Rooms of models that others made, another renderer, true masks: 
 bench-poses: setup ## Estimated camera paths: error, speed, effect on the map (QUICK=1: one room, two arms)
 	$(EXPERIMENT) poses --data $(REAL_DATA) --out $(OUTPUTS)/experiments/bench-poses$(if $(QUICK),-quick) $(ASKED)
 
+.PHONY: bench-poses-refined
+# Five generated rooms of the reporting seeds, four cases: a quarter of an hour of one core (QUICK=1: one room).
+bench-poses-refined: setup ## Given camera paths that drift, refined (QUICK=1: one room)
+	$(EXPERIMENT) poses_refined --out $(OUTPUTS)/experiments/bench-poses-refined$(if $(QUICK),-quick) $(ASKED)
+
 # Two real logs (REAL_DATA) and twenty generated rooms, budgets of 1, 5 and 20 processor minutes: a day of one core. QUICK=1:
 # 10 and 30 seconds, one room.
 .PHONY: interpret

@@ -36,6 +36,10 @@ def inspect(
     cx: Annotated[float | None, typer.Option("--cx", help="As for ingest [pixel].")] = None,
     cy: Annotated[float | None, typer.Option("--cy", help="As for ingest [pixel].")] = None,
     depth_scale: Annotated[float | None, typer.Option("--depth-scale", help="As for ingest [units a metre].")] = None,
+    depth_bits: Annotated[str | None, typer.Option("--depth-bits", help="As for ingest.")] = None,
+    frame_rate: Annotated[float | None, typer.Option("--frame-rate", help="As for ingest [1/s].")] = None,
+    pose_convention: Annotated[str | None, typer.Option("--pose-convention", help="As for ingest.")] = None,
+    pose_scale: Annotated[float | None, typer.Option("--pose-scale", help="As for ingest.")] = None,
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
@@ -56,10 +60,13 @@ def inspect(
         pass  # whoever looks for a log says what it expects
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror}", hint="give an artifact folder or a log") from None
-    option_values = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "depth_scale": depth_scale}
+    numbers = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "depth_scale": depth_scale}
+    numbers |= {"frame_rate": frame_rate, "pose_scale": pose_scale}
+    words = {"depth_bits": depth_bits, "pose_convention": pose_convention}
     settings = [
         *(settings or ()),
-        *(f"{name}={value:.17g}" for name, value in option_values.items() if value is not None),
+        *(f"{name}={value:.17g}" for name, value in numbers.items() if value is not None),
+        *(f"{name}={value}" for name, value in words.items() if value is not None),
     ]
     progress = progress_for(sys.stderr.isatty(), quiet=quiet or json_output)
     if not os.path.exists(path / MANIFEST_NAME):
@@ -67,7 +74,8 @@ def inspect(
             raise UsageError(f"--frames {frames}: a log is judged by its frames", hint="give at least 2")
         inspection = inspect_log(path, ingest_parameters(settings), frames, progress, keep_pictures=html is not None)
         inspection = replace(
-            inspection, report=inspection.report.model_copy(update={"command": _command(inspection.report, settings)})
+            inspection,
+            report=inspection.report.model_copy(update={"command": command_for(inspection.report, settings)}),
         )
         _show(inspection, html, json_output, {})
         return _exit_code(inspection.report, expect, inspection.report.verdict)
@@ -87,21 +95,24 @@ def inspect(
     return _exit_code(inspection.report, expect, artifact.outcome)
 
 
-def _command(report: Any, settings: Sequence[str]) -> str:
+def command_for(report: Any, settings: Sequence[str]) -> str:
     """Return the command that reconstructs the log with these options of ingest, ready to paste; empty where none can.
 
     Options that the pipeline has no variable for are left out.
     """
     from scenewright.stages.engine.pipelines import pipeline_path, read_pipeline
+    from scenewright.stages.ingest.preflight.drift import drifts
 
     streams = {stream for camera in report.cameras for stream in camera.streams}
     if report.verdict == "wasted" or "depth" not in streams or not streams & {"pose", "color"}:
         return ""
-    name = "reconstruct" if "pose" in streams else "reconstruct-without-poses"
+    refined = any(camera.drift is not None and drifts(camera.drift) for camera in report.cameras)
+    name = "reconstruct" if "pose" in streams and not refined else "reconstruct-without-poses"
     variables = read_pipeline(pipeline_path(name)).variables
     assignments = [pair.partition("=") for pair in (f"log={report.path}", *settings)]
     pairs = {key.strip().lstrip("-").replace("-", "_"): value for key, _, value in assignments}
     words = [word for key, value in pairs.items() if key in variables for word in ("--set", f"{key}={value}")]
+    words += ["--set", "poses_method=refine"] * refined
     folder = Path(report.path).resolve().stem or "run"
     return shlex.join([*_program(), "run", name, *words, "--out", f"outputs/{folder}"])
 

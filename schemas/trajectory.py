@@ -48,7 +48,7 @@ class LoopClosure(Model):
 class PosesFile(Model):
     """poses.json: how the poses were estimated, and how far they are to be believed."""
 
-    method: Literal["rgbd", "sfm"]
+    method: Literal["rgbd", "refine", "sfm"]
     camera: str
     """Camera whose poses these are; frames of other cameras have none."""
     gravity: Gravity

@@ -10,6 +10,7 @@ VOXEL_SIZE ?= 0.02
 EVERY ?= 1
 FORMAT ?= auto
 POSES_METHOD ?= rgbd
+POSE_CONVENTION ?= as-is
 SEED ?= 0
 $(if $(LOG),$(if $(wildcard $(LOG)),,$(error LOG=$(LOG): no such file or folder)))
 $(if $(MASKS),$(if $(wildcard $(MASKS)),,$(error MASKS=$(MASKS): no such file or folder)))
@@ -18,10 +19,10 @@ $(if $(LABELS),$(if $(wildcard $(LABELS)),,$(error LABELS=$(LABELS): no such fil
 all: $(FOLDER)/sequence/manifest.json $(FOLDER)/trajectory/manifest.json $(FOLDER)/segments/manifest.json $(FOLDER)/panoptic_map/manifest.json $(FOLDER)/contact_graph/manifest.json $(FOLDER)/cad_library/manifest.json $(FOLDER)/cad_scene/manifest.json $(FOLDER)/interactive_scene/manifest.json $(FOLDER)/evaluation/manifest.json $(FOLDER)/report/manifest.json
 
 $(FOLDER)/sequence/manifest.json: data/pipelines/reconstruct-without-poses.toml $(LOG)
-	$(PYTHON) -m scenewright ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
+	$(PYTHON) -m scenewright ingest --log '$(LOG)' --format '$(FORMAT)' $(if $(CAMERA),--camera '$(CAMERA)') --every '$(EVERY)' $(if $(MAX_FRAMES),--max-frames '$(MAX_FRAMES)') $(if $(DEPTH_SCALE),--depth-scale '$(DEPTH_SCALE)') $(if $(DEPTH_BITS),--depth-bits '$(DEPTH_BITS)') $(if $(FRAME_RATE),--frame-rate '$(FRAME_RATE)') $(if $(POSE_SCALE),--pose-scale '$(POSE_SCALE)') --pose-convention '$(POSE_CONVENTION)' $(if $(FX),--fx '$(FX)') $(if $(FY),--fy '$(FY)') $(if $(CX),--cx '$(CX)') $(if $(CY),--cy '$(CY)') --out $(FOLDER)/sequence
 
-$(FOLDER)/trajectory/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json
-	$(PYTHON) -m scenewright poses --sequence $(FOLDER)/sequence --method '$(POSES_METHOD)' --seed '$(SEED)' --accept tracking_lost --out $(FOLDER)/trajectory
+$(FOLDER)/trajectory/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(wildcard $(FEATURES))
+	$(PYTHON) -m scenewright poses --sequence $(FOLDER)/sequence $(if $(FEATURES),--features '$(FEATURES)') --method '$(POSES_METHOD)' --seed '$(SEED)' --accept tracking_lost --out $(FOLDER)/trajectory
 
 $(FOLDER)/segments/manifest.json: data/pipelines/reconstruct-without-poses.toml $(FOLDER)/sequence/manifest.json $(wildcard $(WEIGHTS)) $(MASKS) $(LABELS)
 	$(PYTHON) -m scenewright segment --sequence $(FOLDER)/sequence $(if $(WEIGHTS),--weights '$(WEIGHTS)') $(if $(MASKS),--masks '$(MASKS)') $(if $(LABELS),--labels '$(LABELS)') --backend '$(BACKEND)' --seed '$(SEED)' --out $(FOLDER)/segments

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from scenewright.stages.kit.formats.frames import FrameReader
-from scenewright.stages.kit.registration.pairs import edge_of, overlap_candidates
-from scenewright.stages.kit.registration.pose_graph import Edge, Solution, laid_out, optimize, parts_of
+from scenewright.stages.kit.registration.pairs import edge_of, overlap_candidates, seen_shares
+from scenewright.stages.kit.registration.pose_graph import (
+    Edge,
+    Solution,
+    laid_out,
+    optimize,
+    optimize_gradually,
+    parts_of,
+)
 from scenewright.stages.kit.registration.pyramid import Pyramid, build_pyramid
-from scenewright.stages.kit.registration.rigid_motion import between
+from scenewright.stages.kit.registration.rigid_motion import between, inverses
 from scenewright.stages.kit.stage import Context
-from scenewright.stages.poses.features import Features, find_features
+from scenewright.stages.poses.features import Corners, Features, find_features, orb_corners
 from scenewright.stages.poses.loops import Loop, PyramidCache, Verifier, place_candidates
 from scenewright.stages.poses.parameters import PosesParameters
 from scenewright.stages.poses.places import Ferns
 from scenewright.stages.poses.tracking import Seen, Track, Tracker, TrackingLimits
+from scenewright.stages.poses.world import given_poses
 
 LEVELS = 3
 """Levels of the image pyramids in which frames are aligned; by eye."""
@@ -40,9 +49,11 @@ class Estimate:
 class FrameSource:
     """Frames of the main camera of a sequence, as tracking and loop closure need them."""
 
-    def __init__(self, reader: FrameReader, camera_name: str, parameters: PosesParameters, ferns: Ferns) -> None:
+    def __init__(
+        self, reader: FrameReader, camera_name: str, parameters: PosesParameters, ferns: Ferns, corners: Corners
+    ) -> None:
         self.camera = reader.cameras[camera_name]
-        self._reader, self._parameters, self._ferns = reader, parameters, ferns
+        self._reader, self._parameters, self._ferns, self._corners = reader, parameters, ferns, corners
 
     def pyramid(self, index: int) -> Pyramid:
         """Read a frame and return its pyramid."""
@@ -67,7 +78,7 @@ class FrameSource:
         )
 
         def describe() -> Features:
-            return find_features(color, depth, camera, parameters.maximum_depth)
+            return find_features(color, depth, camera, parameters.maximum_depth, self._corners)
 
         return Seen(index, pyramid, describe, lambda: self._ferns.code(depth))
 
@@ -87,11 +98,20 @@ def limits_of(parameters: PosesParameters) -> TrackingLimits:
 
 
 def estimate(
-    reader: FrameReader, frames: list[int], camera_name: str, parameters: PosesParameters, context: Context
+    reader: FrameReader,
+    frames: list[int],
+    camera_name: str,
+    parameters: PosesParameters,
+    context: Context,
+    corners: Corners = orb_corners,
 ) -> Estimate:
-    """Track the frames (indices in the sequence, ascending), close loops and optimise."""
-    source = FrameSource(reader, camera_name, parameters, Ferns(context.random(1)))
-    tracker = Tracker(limits_of(parameters), parameters.use_color, context.random(2))
+    """Track the frames (indices in the sequence, ascending), close loops and optimise; `corners` find the features."""
+    source = FrameSource(reader, camera_name, parameters, Ferns(context.random(1)), corners)
+    refines = parameters.method == "refine"
+    given = given_poses(reader, frames) if refines else {}
+    # Odometry that a loop contradicts by far is wrong, and the path has to say so; given poses are known to drift.
+    settle = optimize_gradually if refines else optimize
+    tracker = Tracker(limits_of(parameters), parameters.use_color, context.random(2), given)
     with context.progress.step("odometry"):
         for index in context.progress.track(frames, total=len(frames), description="odometry"):
             tracker.add(source.seen(index))
@@ -102,10 +122,10 @@ def estimate(
     candidates: dict[str, int] = {}
     if parameters.loop_closure and len(track.keys) > 1:
         with context.progress.step("loop closure"):
-            poses, loops, candidates = _close_loops(source, track, poses, edges, parameters, context)
+            poses, loops, candidates = _close_loops(source, track, poses, edges, settle, parameters, context)
     every = edges + [edge_of(loop.target, loop.source, loop.alignment, switchable=True) for loop in loops]
     with context.progress.step("pose graph"):
-        solution = optimize(poses, every)
+        solution = settle(poses, every)
     parts = parts_of(len(track.keys), believed(every, solution))
     return Estimate(track, solution.world_from_node, parts, every, loops, solution, candidates)
 
@@ -120,14 +140,26 @@ def _close_loops(
     track: Track,
     poses: np.ndarray,
     edges: list[Edge],
+    settle: Callable[[np.ndarray, list[Edge]], Solution],
     parameters: PosesParameters,
     context: Context,
 ) -> tuple[np.ndarray, list[Loop], dict[str, int]]:
     """Return poses (K, 4, 4) with the loops that were verified, and how many pairs were tried."""
     pyramids = PyramidCache(lambda key: source.pyramid(track.keys[key].frame))
     verifier = Verifier(track.keys, pyramids, limits_of(parameters), parameters.use_color, context.random(3))
+    cameras = [source.camera] * len(track.keys)
+
+    def near(later: int) -> np.ndarray:
+        """Whether earlier key frames see anything of the same: given poses are not off by rooms."""
+        motions = inverses(poses[:later]) @ poses[later]
+        return seen_shares(track.keys[:later], track.keys[later], motions, cameras[:later]) > 0
+
     pairs = place_candidates(
-        track.keys, context.random(4), per_key=parameters.loop_candidates, least_gap=parameters.loop_gap
+        track.keys,
+        context.random(4),
+        per_key=parameters.loop_candidates,
+        least_gap=parameters.loop_gap,
+        near=near if parameters.method == "refine" else None,
     )
     tried = {"place": len(pairs), "overlap": 0}
     loops: list[Loop] = []
@@ -135,10 +167,10 @@ def _close_loops(
         loop = verifier.by_appearance(target, later)
         if loop is not None:
             loops.append(loop)
-    pairs_tried, cameras = set(pairs), [source.camera] * len(track.keys)
+    pairs_tried = set(pairs)
     for _ in range(parameters.overlap_rounds):
         every = edges + [edge_of(loop.target, loop.source, loop.alignment, switchable=True) for loop in loops]
-        solution = optimize(laid_out(poses, every), every)
+        solution = settle(laid_out(poses, every), every)
         poses = solution.world_from_node
         parts = parts_of(len(poses), believed(every, solution))
         fresh = overlap_candidates(track.keys, poses, cameras, pairs_tried, per_key=parameters.overlap_candidates)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -17,6 +18,8 @@ RATIO = 0.85
 """A match must be better than the second best by this factor (Lowe 2004)."""
 LARGEST_DISTANCE = 70
 """Descriptors that differ in more of their 256 bits are no match."""
+LEAST_COSINE = 0.82
+"""Learned descriptors whose cosine is less are no match; published for XFeat."""
 SMALLEST_SIDE = 32
 """Images of fewer pixels a side have no corner: a descriptor reaches 15 pixels around it."""
 TRIALS = 400
@@ -32,7 +35,7 @@ class Features:
     points: np.ndarray
     """(N, 3) float32 in the camera [m]."""
     descriptors: np.ndarray
-    """(N, 32) uint8, 256 bits."""
+    """(N, 32) uint8, 256 bits, or (N, C) float32 of length 1."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,22 @@ def _detector() -> Any:
     return cv2.ORB.create(nfeatures=FEATURES, scaleFactor=1.3, nlevels=6, fastThreshold=12)
 
 
-def find_features(color: np.ndarray | None, depth: np.ndarray, camera: Camera, maximum_depth: float) -> Features:
-    """Return the ORB corners (Rublee 2011) of a frame that have depth below `maximum_depth` [m].
+Corners = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Picture (H, W, 3) uint8 RGB -> pixels (N, 2) float32 and descriptors (N, ...)."""
+
+
+def orb_corners(color: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return pixels (N, 2) and descriptors (N, 32) uint8 of the ORB corners (Rublee 2011) of a picture."""
+    corners, descriptors = _detector().detectAndCompute(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), None)
+    if descriptors is None:
+        descriptors = np.zeros((0, 32), np.uint8)
+    return np.array([corner.pt for corner in corners], dtype=np.float32).reshape(-1, 2), descriptors
+
+
+def find_features(
+    color: np.ndarray | None, depth: np.ndarray, camera: Camera, maximum_depth: float, corners: Corners = orb_corners
+) -> Features:
+    """Return the corners of a frame that have depth below `maximum_depth` [m].
 
     `color` is (H, W, 3) uint8 RGB or None, which gives no features, as does an image too small for one; `depth` is
     (H, W) float32 [m], 0 invalid.
@@ -59,10 +76,9 @@ def find_features(color: np.ndarray | None, depth: np.ndarray, camera: Camera, m
     empty = Features(np.zeros((0, 2), np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 32), np.uint8))
     if color is None or min(color.shape[:2]) < SMALLEST_SIDE:
         return empty
-    corners, descriptors = _detector().detectAndCompute(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), None)
-    if descriptors is None or not len(corners):
+    pixels, descriptors = corners(color)
+    if not len(pixels):
         return empty
-    pixels = np.array([corner.pt for corner in corners], dtype=np.float32)
     columns = np.clip(np.rint(pixels[:, 0]).astype(int), 0, depth.shape[1] - 1)
     rows = np.clip(np.rint(pixels[:, 1]).astype(int), 0, depth.shape[0] - 1)
     z = depth[rows, columns]
@@ -78,6 +94,11 @@ def match_features(target: Features, source: Features) -> np.ndarray:
     """Return rows (K, 2), target and source, of descriptors that choose each other and are clear about it."""
     if len(target.descriptors) < 3 or len(source.descriptors) < 3:
         return np.zeros((0, 2), dtype=int)
+    if target.descriptors.dtype != np.uint8:
+        cosines = source.descriptors @ target.descriptors.T
+        own, best = np.arange(len(cosines)), cosines.argmax(axis=1)
+        chosen = (cosines.argmax(axis=0)[best] == own) & (cosines[own, best] > LEAST_COSINE)
+        return np.stack([best[chosen], own[chosen]], axis=1)
     matcher = cv2.BFMatcher(cv2.NORM_HAMMING)
     back = {m.queryIdx: m.trainIdx for m in matcher.match(target.descriptors, source.descriptors)}
     rows = [

@@ -64,11 +64,17 @@ class PyramidCache:
 
 
 def place_candidates(
-    keys: list[KeyFrame], random: np.random.Generator, *, per_key: int, least_gap: int
+    keys: list[KeyFrame],
+    random: np.random.Generator,
+    *,
+    per_key: int,
+    least_gap: int,
+    near: Callable[[int], np.ndarray] | None = None,
 ) -> list[tuple[int, int]]:
     """Return pairs (earlier, later) of key frames that look alike, the most alike first for each later one.
 
-    Neighbours of one part (fewer than `least_gap` key frames apart) are no candidates.
+    Neighbours of one part (fewer than `least_gap` key frames apart) are no candidates; nor is what `near`, asked for a
+    later key frame, denies of those before it (K,).
     """
     if len(keys) < 2:
         return []
@@ -85,6 +91,8 @@ def place_candidates(
         else:
             scores, least = fern_likeness(codes[later], codes[:later]), LEAST_FERNS
         allowed = (scores >= least) & ((parts[:later] != parts[later]) | (later - numbers >= least_gap))
+        if near is not None:
+            allowed &= near(later)
         ranked = numbers[allowed][np.argsort(-scores[allowed], kind="stable")]
         pairs += [(int(earlier), later) for earlier in ranked[:per_key]]
     return pairs

@@ -9,16 +9,17 @@ from pydantic import Field
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
-from scenewright.stages.kit.stage import Parameters, Stage
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 
 class PosesParameters(Parameters):
     """Options of `poses`."""
 
-    method: Literal["rgbd", "sfm"] = Field(
+    method: Literal["rgbd", "refine", "sfm"] = Field(
         "rgbd",
-        description="`rgbd`: dense RGB-D odometry, loops and a pose graph; `sfm`: structure from motion on features "
-        "(pycolmap), scaled by the depth",
+        description="`rgbd`: dense RGB-D odometry, loops and a pose graph; `refine`: the same with the motions of the "
+        "sequence's own poses (a phone's, which drift) in the place of odometry, where the depth does not deny them; "
+        "`sfm`: structure from motion on features (pycolmap), scaled by the depth",
     )
     loop_closure: bool = Field(True, description="`rgbd`: recognise places and optimise the pose graph; off: odometry")
     bundle_adjustment: bool = Field(
@@ -70,13 +71,24 @@ def check(parameters: PosesParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError("--bundle-adjustment needs colour", hint="leave --no-use-color out")
     if parameters.method == "sfm" and not parameters.use_color:
         raise UsageError("--method sfm needs colour", hint="leave --no-use-color out, or use --method rgbd")
+    if "features" in inputs and (parameters.method == "sfm" or not parameters.use_color):
+        raise UsageError("--features needs colour, and --method rgbd or refine", hint="leave --features out")
 
 
 STAGE = Stage(
     name="poses",
     summary="Estimate the camera's path of an RGB-D log: odometry, loop closure, pose graph",
     parameters=PosesParameters,
-    reads={"sequence": Sequence},
+    reads={
+        "sequence": Sequence,
+        "features": Optionally(
+            External(
+                "Network that finds corners by which places are recognised and registered: xfeat (see `scenewright "
+                "models`), or its file (.onnx); without it ORB does",
+                weights=True,
+            )
+        ),
+    },
     writes=Trajectory,
     libraries=("numpy", "numba", "scipy", "opencv-python-headless", "pycolmap"),
     check=check,

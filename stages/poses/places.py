@@ -1,9 +1,10 @@
 """Recognising places: which earlier key frames may show what this one shows.
 
-With colour: a bag of binary words. A word is a fixed choice of bits of an ORB descriptor (locality-sensitive hashing,
-Indyk and Motwani 1998), so that no vocabulary has to be trained or shipped; words are weighted by their rarity
-(tf-idf, Sivic and Zisserman 2003). Without: random ferns on the depth image (Glocker, Shotton, Criminisi and Izadi,
-Real-time RGB-D camera relocalization via randomized ferns, 2015).
+With colour: a bag of binary words. A word is a fixed choice of bits of a descriptor (locality-sensitive hashing, Indyk
+and Motwani 1998), so that no vocabulary has to be trained or shipped; words are weighted by their rarity (tf-idf, Sivic
+and Zisserman 2003). A descriptor of real numbers has a bit for each of some random planes: on which side it lies
+(Charikar 2002). Without colour: random ferns on the depth image (Glocker, Shotton, Criminisi and Izadi, Real-time RGB-D
+camera relocalization via randomized ferns, 2015).
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from collections import defaultdict
 
 import numpy as np
 
+BITS = 256
+"""Of a descriptor."""
 TABLES, WORD_BITS = 12, 16
 """Words of a descriptor, and bits of a word; by eye."""
 FERNS = 400
@@ -25,15 +28,21 @@ class PlaceIndex:
     """Scores of a frame's descriptors against those of the frames that were added before."""
 
     def __init__(self, random: np.random.Generator) -> None:
-        self._bits = np.stack([random.choice(256, WORD_BITS, replace=False) for _ in range(TABLES)])
+        self._bits = np.stack([random.choice(BITS, WORD_BITS, replace=False) for _ in range(TABLES)])
+        self._random = random
+        self._planes = np.zeros((0, BITS))
         self._places: dict[int, list[int]] = defaultdict(list)
         self._words: list[np.ndarray] = []
         self._norms: np.ndarray | None = None
 
     def words(self, descriptors: np.ndarray) -> np.ndarray:
-        """Return the sorted distinct words (K,) int64 of descriptors (N, 32) uint8."""
+        """Return the sorted distinct words (K,) int64 of descriptors (N, 32) uint8, or (N, C) of real numbers."""
         if not len(descriptors):
             return np.zeros(0, dtype=np.int64)
+        if descriptors.dtype != np.uint8:
+            if len(self._planes) != descriptors.shape[1]:
+                self._planes = self._random.normal(size=(descriptors.shape[1], BITS))
+            descriptors = np.packbits(descriptors @ self._planes > 0, axis=1)
         bits = np.unpackbits(descriptors, axis=1)[:, self._bits].astype(np.int64)
         codes = bits @ (1 << np.arange(WORD_BITS, dtype=np.int64))
         return np.unique(codes + (np.arange(TABLES, dtype=np.int64) << WORD_BITS))

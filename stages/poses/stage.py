@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
@@ -16,9 +17,11 @@ from scenewright.stages.kit.stage import Context
 from scenewright.stages.poses.contradiction import contradicted
 from scenewright.stages.poses.drift import drift_of, loop_closures, path_length
 from scenewright.stages.poses.estimation import estimate
+from scenewright.stages.poses.features import Corners, orb_corners
 from scenewright.stages.poses.frame_poses import FramePose, frame_poses
 from scenewright.stages.poses.parameters import PosesParameters
-from scenewright.stages.poses.world import choose_world, without_poses
+from scenewright.stages.poses.world import choose_world, given_poses, without_poses
+from scenewright.stages.poses.xfeat import XFeat
 
 MOST_CONTRADICTED, FEWEST_LOOPS = 0.15, 10
 """A path is not to be trusted that denies more than this share of its loops, of so many at least. Of four good paths
@@ -40,8 +43,12 @@ class Result:
     """For the summary."""
 
 
-def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) -> Trajectory:
+def run(
+    sequence: Sequence, features: Path | None = None, *, parameters: PosesParameters, context: Context
+) -> Trajectory:
     """Estimate the pose of every frame of the main camera; write trajectory.tum and poses.json.
+
+    `features` is the file of a network that finds corners (XFeat); None: ORB.
 
     Frames that could not be placed have no line in trajectory.tum, so that `fuse` skips them, and the outcome is then
     `tracking_lost`; `contradictory` when the path denies the places that it comes back to; `empty` when no two frames
@@ -49,11 +56,12 @@ def run(sequence: Sequence, *, parameters: PosesParameters, context: Context) ->
     colour where the method needs it, or with fewer than two frames of its main camera.
     """
     require_depth(sequence)
+    corners = orb_corners if features is None else XFeat(features)
     with FrameReader(sequence.path("frames.mcap")) as reader:
         camera_name, frames = main_camera(reader, sequence)
         check_streams(reader, sequence, parameters)
         check_world(reader, frames, sequence, parameters)
-        result = METHODS[parameters.method].estimate(reader, frames, camera_name, parameters, context)
+        result = METHODS[parameters.method].estimate(reader, frames, camera_name, parameters, context, corners)
         result = _without_contradicted(result, reader, camera_name, parameters, context)
         return _finish(reader, camera_name, result, parameters, context)
 
@@ -82,15 +90,20 @@ def check_streams(reader: FrameReader, sequence: Sequence, parameters: PosesPara
 
 
 def check_world(reader: FrameReader, frames: list[int], sequence: Sequence, parameters: PosesParameters) -> None:
-    """Raise BadInput, before any work, when the world of a sequence without poses is asked for."""
-    if parameters.world == "sequence" and all(reader.read(k, ()).world_from_camera is None for k in frames):
-        raise without_poses(f"{sequence.root}: none of its frames")
+    """Raise BadInput, before any work, when the world or the motions of a sequence without poses are asked for."""
+    if (parameters.world == "sequence" or parameters.method == "refine") and not given_poses(reader, frames):
+        raise without_poses(f"{sequence.root}: none of its frames", parameters.method)
 
 
 def _dense(
-    reader: FrameReader, frames: list[int], camera_name: str, parameters: PosesParameters, context: Context
+    reader: FrameReader,
+    frames: list[int],
+    camera_name: str,
+    parameters: PosesParameters,
+    context: Context,
+    corners: Corners,
 ) -> Result:
-    estimated = estimate(reader, frames, camera_name, parameters, context)
+    estimated = estimate(reader, frames, camera_name, parameters, context, corners)
     if parameters.bundle_adjustment:
         from scenewright.stages.poses.bundle_adjustment import adjust
 
@@ -110,7 +123,12 @@ def _dense(
 
 
 def _structure(
-    reader: FrameReader, frames: list[int], camera_name: str, parameters: PosesParameters, context: Context
+    reader: FrameReader,
+    frames: list[int],
+    camera_name: str,
+    parameters: PosesParameters,
+    context: Context,
+    corners: Corners,
 ) -> Result:
     from scenewright.stages.poses.structure_from_motion import reconstruct
 
@@ -122,13 +140,14 @@ def _structure(
 class Method:
     """A way of estimating poses."""
 
-    estimate: Callable[[FrameReader, list[int], str, PosesParameters, Context], Result]
+    estimate: Callable[[FrameReader, list[int], str, PosesParameters, Context, Corners], Result]
     """Of the given frames of the camera of this name."""
     needs_color: Callable[[PosesParameters], bool]
 
 
 METHODS = {
     "rgbd": Method(_dense, lambda parameters: parameters.bundle_adjustment),
+    "refine": Method(_dense, lambda parameters: parameters.bundle_adjustment),
     "sfm": Method(_structure, lambda parameters: True),
 }
 
@@ -243,9 +262,10 @@ def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, obj
         what = f"{denied} of {len(info.loops)} places that look the same"
         if contradicted_share(info.loops) <= MOST_CONTRADICTED:
             what = f"the depth of {wrong_frames(info)} of {len(info.frames)} frames"
-        summary["reason"] = (
-            f"the path denies {what}: it may be off by decimetres; record more pictures a second, or turn more slowly"
-        )
+        advice = "record more pictures a second, or turn more slowly"
+        if info.method == "refine":
+            advice = "compare it with that of --method rgbd, which does not look at the given poses"
+        summary["reason"] = f"the path denies {what}: it may be off by decimetres; {advice}"
         context.logger.warning("%s", summary["reason"])
     return summary
 

@@ -2,24 +2,30 @@
 
 A part is a stretch of frames whose relative poses are known. Loops may join parts later (stages/poses/loops.py);
 frames of parts that nothing joins with the largest one stay without a pose.
+
+Where poses are given, the motion between two frames is theirs, and only looked for where the depth denies it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import inverse
-from scenewright.stages.kit.registration.alignment import Alignment, align
+from scenewright.stages.kit.registration.alignment import Alignment, align, judge
 from scenewright.stages.kit.registration.pairs import Limits
 from scenewright.stages.kit.registration.pyramid import Pyramid
-from scenewright.stages.kit.registration.rigid_motion import angle_of, distance_of, exponential
+from scenewright.stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
 from scenewright.stages.poses.features import Features, ransac_motion
 
 LEAST_DEPTH_SHARE = 0.03
 """A frame with depth on fewer of its pixels cannot be tracked."""
+GIVEN_TURN, GIVEN_WAY = math.radians(0.3), 0.01
+"""Stated uncertainty of given poses: standard deviations that a metre of way adds, or a radian of turning, along each
+axis [rad and m]. Steps count as independent: over a hundred metres these make 3 degrees and 10 cm. So tight that depth
+that slides along a bare wall does not take the path with it; by eye."""
 SEARCH_ANGLES = (math.radians(8), math.radians(16))
 """Turns about each axis that are tried when nothing else helps."""
 
@@ -99,9 +105,17 @@ class Seen:
 class Tracker:
     """Takes frames in order."""
 
-    def __init__(self, limits: TrackingLimits, use_color: bool, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        limits: TrackingLimits,
+        use_color: bool,
+        random: np.random.Generator,
+        given: Mapping[int, np.ndarray] | None = None,
+    ) -> None:
+        """`given`: frame (index in the sequence) -> world_from_camera (4, 4) that is refined; none by default."""
         self.track = Track()
         self._limits, self._use_color, self._random = limits, use_color, random
+        self._given = given or {}
         self._key: Seen | None = None
         self._previous: Seen | None = None
         self._key_from_previous = np.eye(4)
@@ -112,14 +126,19 @@ class Tracker:
 
     def add(self, seen: Seen) -> None:
         """Track one frame."""
+        given = self._as_given(seen)
         if seen.pyramid.depth_share < LEAST_DEPTH_SHARE:
+            if given is not None:
+                self._hang_on_key(seen, given)
+                return
             self.track.frames.append(TrackedFrame(seen.frame, None, np.eye(4), None, "no_depth"))
             self._motion = np.eye(4)
             return
         if self._key is None:
             self._begin_part(seen, "")
             return
-        alignment = self._locate(seen)
+        is_denied = given is None or given.agreement < self._limits.agreement
+        alignment = (self._locate(seen, given) if is_denied else None) or given
         if alignment is None:
             self._begin_part(seen, "lost")
             return
@@ -134,13 +153,26 @@ class Tracker:
         if due:
             self.track.frames.append(self._continue_part(seen, alignment))
         else:
-            number = len(self.track.keys) - 1
-            self.track.frames.append(TrackedFrame(seen.frame, number, alignment.target_from_source, alignment))
+            self._hang_on_key(seen, alignment)
 
-    def _locate(self, seen: Seen) -> Alignment | None:
+    def _hang_on_key(self, seen: Seen, alignment: Alignment) -> None:
+        number = len(self.track.keys) - 1
+        self.track.frames.append(TrackedFrame(seen.frame, number, alignment.target_from_source, alignment))
+
+    def _as_given(self, seen: Seen) -> Alignment | None:
+        """Return where the given poses put a frame in the key frame, and what the depth says of that."""
+        if self._key is None or self._key.frame not in self._given or seen.frame not in self._given:
+            return None
+        motion = between(self._given[self._key.frame], self._given[seen.frame])
+        judged = judge(self._key.pyramid, seen.pyramid, motion)
+        steps = max(distance_of(motion) + angle_of(motion), 1e-3)
+        information = np.diag(np.repeat([GIVEN_TURN**-2.0, GIVEN_WAY**-2.0], 3)) / steps
+        return replace(judged, information=information)
+
+    def _locate(self, seen: Seen, given: Alignment | None) -> Alignment | None:
         """Return where a frame is in the key frame, trying one guess after the other; None when it is lost."""
         assert self._key is not None and self._previous is not None
-        expected = self._key_from_previous @ self._motion
+        expected = self._key_from_previous @ self._motion if given is None else given.target_from_source
         alignment = self._try(self._key, seen, expected)
         if alignment is None:
             alignment = self._try(self._key, seen, self._key_from_previous)

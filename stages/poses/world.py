@@ -30,9 +30,10 @@ def laid_onto(estimated: np.ndarray, given: np.ndarray) -> np.ndarray:
     return transform_from(rotation, (given[:, :3, 3] - estimated[:, :3, 3] @ rotation.T).mean(axis=0))
 
 
-def without_poses(frames: str) -> BadInput:
-    """Return the error of a world of the sequence that none of the `frames` knows."""
-    return BadInput(f"{frames} has a pose in the sequence", hint="choose --world upright or first")
+def without_poses(frames: str, method: str) -> BadInput:
+    """Return the error of a world, or of motions to refine, of the sequence that none of the `frames` knows."""
+    hint = "use --method rgbd, which needs none" if method == "refine" else "choose --world upright or first"
+    return BadInput(f"{frames} has a pose in the sequence", hint=hint)
 
 
 def choose_world(
@@ -43,14 +44,14 @@ def choose_world(
     `frames` (N,) are their indices in the sequence. Raises BadInput when the world of the sequence was asked for and
     none of these frames has a pose there.
     """
-    given_poses = _given_poses(reader, frames) if world in ("auto", "sequence") else {}
-    if given_poses:
-        rows = [row for row, frame in enumerate(frames) if frame in given_poses]
-        motion = laid_onto(poses[rows], np.array([given_poses[frames[row]] for row in rows]))
+    given = given_poses(reader, frames) if world in ("auto", "sequence") else {}
+    if given:
+        rows = [row for row, frame in enumerate(frames) if frame in given]
+        motion = laid_onto(poses[rows], np.array([given[frames[row]] for row in rows]))
         detail = f"laid onto the sequence's own poses of {len(rows)} frames"
         return "sequence", Gravity(method="given", world_from_log=as_transform(motion), detail=detail)
     if world == "sequence":
-        raise without_poses("none of the frames that were placed")
+        raise without_poses("none of the frames that were placed", "")
     if world == "first":
         return "first", Gravity(method="none", world_from_log=as_transform(np.eye(4)), detail="not asked for")
 
@@ -66,6 +67,7 @@ def choose_world(
     return "upright", make_upright("auto", "z", None, poses, cloud, random)
 
 
-def _given_poses(reader: FrameReader, frames: list[int]) -> dict[int, np.ndarray]:
+def given_poses(reader: FrameReader, frames: list[int]) -> dict[int, np.ndarray]:
+    """Return the poses (4, 4) that the sequence has of some of the frames, by frame."""
     poses = ((frame, reader.read(frame, ()).world_from_camera) for frame in frames)
     return {frame: pose for frame, pose in poses if pose is not None}

@@ -13,16 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.geometry.transforms import inverse
-from scenewright.stages.kit.registration.pairs import Limits, agreed, edge_of, overlap_candidates
-from scenewright.stages.kit.registration.pose_graph import SWITCH, Edge, optimize
+from scenewright.stages.kit.registration.pairs import USUAL_LIMITS, agreed, edge_of, overlap_candidates
+from scenewright.stages.kit.registration.pose_graph import SWITCHES, Edge, optimize, optimize_gradually
 from scenewright.stages.kit.registration.pyramid import Pyramid, build_pyramid
 from scenewright.stages.kit.registration.rigid_motion import adjoint, angle_of, between, distance_of
 from scenewright.stages.splat.views import PosedView
 
 WIDTH, LEVELS, FARTHEST = 160, 3, 6.0
 """Width of the pictures that are aligned [px], their resolutions, and the farthest depth [m]; by eye."""
-LIMITS = Limits(overlap=0.3, agreement=0.75, residual=0.03, uncertainty=0.05, brightness=0.1)
-"""Limits within which an alignment is believed: those of `poses` (docs/POSES.md)."""
 PER_VIEW = 2
 """Earlier views that a view is aligned with, beside the one before it, at most."""
 PLACED_BY = 4
@@ -31,9 +29,6 @@ GIVEN_STILL = np.array([0.01] * 3 + [0.01] * 3)
 """Standard deviation of a motion between neighbours as the log gives it [rad, m], without its own length."""
 GIVEN_SHARE = 0.05
 """Standard deviation that is added for a motion's own length, as a share of it."""
-SWITCHES = (1e4, 1e2, SWITCH)
-"""Weights from believing all alignments to dropping those that contradict the others: far drift is no reason to drop
-one."""
 SPARSE = 200
 """Points of a picture of which overlap is told; by eye."""
 
@@ -70,9 +65,7 @@ class Adjustment:
         poses = optimize(world_from_camera, chain + self.edges, switch=SWITCHES[0]).world_from_node
         cameras = [key.camera for key in self._keys]
         self._align(overlap_candidates(self._keys, poses, cameras, self.tried, per_key=PER_VIEW), poses)
-        for switch in SWITCHES:
-            poses = optimize(poses, chain + self.edges, switch=switch).world_from_node
-        return poses
+        return optimize_gradually(poses, chain + self.edges).world_from_node
 
     def placed(
         self, view: PosedView, guess: np.ndarray, views: Sequence[PosedView], world_from_camera: np.ndarray
@@ -85,7 +78,9 @@ class Adjustment:
         edges = []
         for k in order[:PLACED_BY]:
             guess_between = between(world_from_camera[k], guess)
-            alignment = agreed(self._keys[k].pyramid, key.pyramid, guess_between, LIMITS, use_color=True, coarsest=None)
+            alignment = agreed(
+                self._keys[k].pyramid, key.pyramid, guess_between, USUAL_LIMITS, use_color=True, coarsest=None
+            )
             if alignment is not None:
                 edge = edge_of(0, 1, alignment, switchable=True)
                 turned = adjoint(inverse(world_from_camera[k]))
@@ -102,7 +97,7 @@ class Adjustment:
             self.tried.add((target, source))
             first, second = self._keys[target].pyramid, self._keys[source].pyramid
             guess = between(poses[target], poses[source])
-            alignment = agreed(first, second, guess, LIMITS, use_color=True, coarsest=None)
+            alignment = agreed(first, second, guess, USUAL_LIMITS, use_color=True, coarsest=None)
             if alignment is not None:
                 self.edges.append(edge_of(target, source, alignment, switchable=True))
 

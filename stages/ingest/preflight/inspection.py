@@ -21,6 +21,7 @@ from scenewright.stages.ingest.preflight.bits import bits_finding
 from scenewright.stages.ingest.preflight.calibration import calibration_findings, calibration_report
 from scenewright.stages.ingest.preflight.choice import Choice, choose
 from scenewright.stages.ingest.preflight.depth import depth_findings, depth_report, units_per_metre
+from scenewright.stages.ingest.preflight.drift import drift_findings, drift_report
 from scenewright.stages.ingest.preflight.epipolar import FeaturePairs
 from scenewright.stages.ingest.preflight.looking import Look, look_at_entry
 from scenewright.stages.ingest.preflight.motion import motion_findings, motion_report
@@ -279,7 +280,13 @@ def _judge_camera(
         )
     if motion is not None:
         findings += motion_findings(motion, outcome.report.verdict == "agree", name)
-    findings += registration_findings(registration, interval, name)
+    unregistered = registration_findings(registration, interval, name)
+    findings += unregistered
+    drift = None
+    if poses is not None and not unregistered and (outcome.report.verdict, outcome.report.method) == ("agree", "depth"):
+        drift = drift_report(poses, looks)
+    if drift is not None:
+        findings += drift_findings(drift, name)
     if pictures is not None:
         findings += picture_findings(pictures, name)
     have = {
@@ -301,6 +308,7 @@ def _judge_camera(
         registration=registration,
         pictures=pictures,
         motion=motion,
+        drift=drift,
         stereo=stereo,
     )
     return report, outcome, findings

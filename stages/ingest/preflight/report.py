@@ -179,6 +179,18 @@ class PoseReport(Model):
     """Times [s] of the first of those."""
 
 
+class DriftReport(Model):
+    """By how much poses miss places that the camera comes back to: medians over pairs of frames that were aligned."""
+
+    places: int
+    missed: float
+    """[m]"""
+    way: float
+    """Between the two frames, a radian of turning counted as a metre [m]."""
+    neighbours_missed: float
+    """The same of frames that follow each other closely: what alignment itself is off [m]."""
+
+
 class RegistrationReport(Model):
     """Whether colour and depth show the same thing at the same place and time."""
 
@@ -267,6 +279,8 @@ class CameraReport(Model):
     registration: RegistrationReport
     pictures: PictureReport | None = None
     motion: MotionReport | None = None
+    drift: DriftReport | None = None
+    """None where the poses do not agree with the depth, or the camera does not come back."""
     stereo: StereoReport | None = None
 
 

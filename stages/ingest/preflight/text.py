@@ -108,6 +108,13 @@ def _camera_lines(report: CameraReport) -> Iterator[str]:
         yield _row("", "decisive" if report.poses.decisive else "not decisive")
     if report.poses.scale_fit is not None and report.poses.verdict == "agree":
         yield _row("", f"translations fit best at {report.poses.scale_fit:.3g} times their length")
+    drift = report.drift
+    if drift is not None:
+        yield _row(
+            "drift",
+            f"{drift.places} places that the camera comes back to are missed by {100 * drift.missed:.2g} cm (median), "
+            f"neighbours by {100 * drift.neighbours_missed:.2g} cm",
+        )
     motion = report.motion
     if motion is not None:
         overlap = f", neighbours share {100 * motion.overlap:.0f} %" if motion.overlap is not None else ""

@@ -44,6 +44,10 @@ class Limits:
         )
 
 
+USUAL_LIMITS = Limits(overlap=0.3, agreement=0.75, residual=0.03, uncertainty=0.05, brightness=0.1)
+"""Those that `poses` has by default."""
+
+
 class Sighted(Protocol):
     """What is known of a key frame without its images."""
 

@@ -20,6 +20,8 @@ from scipy.sparse.linalg import splu
 SWITCH = 12.0
 """Phi of dynamic covariance scaling: loop edges whose squared error is above it (6 degrees of freedom, of which two
 standard deviations each) begin to lose weight."""
+SWITCHES = (1e4, 1e2, SWITCH)
+"""Phi from believing all loops to dropping those that contradict the others: far drift is no reason to drop one."""
 ANCHOR = 1e12
 """Information with which the first node of each connected part is held."""
 MAXIMUM_ITERATIONS = 50
@@ -136,6 +138,15 @@ def optimize(world_from_node: np.ndarray, edges: Sequence[Edge], *, switch: floa
             break
     matrix, _ = _assemble(poses, graph, weights, anchors)
     return Solution(poses, weights, errors, matrix, iterations)
+
+
+def optimize_gradually(world_from_node: np.ndarray, edges: Sequence[Edge]) -> Solution:
+    """As `optimize`, for a start that has drifted by more than loops claim to be uncertain: at first every loop is
+    believed, then those less and less that the others contradict (graduated non-convexity, Yang et al. 2020)."""
+    for switch in SWITCHES:
+        solution = optimize(world_from_node, edges, switch=switch)
+        world_from_node = solution.world_from_node
+    return solution
 
 
 def squared_errors(poses: np.ndarray, edges: Sequence[Edge]) -> np.ndarray:

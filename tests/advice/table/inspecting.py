@@ -106,6 +106,7 @@ ROWS = [
         for file, says in (
             ("depth", "ingest with --maximum-depth"),
             ("depth", "find out the unit"),
+            ("drift", "poses_method=refine"),
             ("motion", "use the part before or after"),
             ("motion", "use --every, or other poses"),
             ("pictures", "use --every, or rescan"),

@@ -6,10 +6,19 @@ from pathlib import Path
 
 from scenewright.stages.kit.formats.trajectories import read_tum
 
-from tests.advice.rows import Tried
+from tests.advice.rows import NotTried, Tried
 
-OPTIONS, STAGE, WORLD = "stages/poses/parameters.py", "stages/poses/stage.py", "stages/poses/world.py"
+OPTIONS, STAGE, WORLD, XFEAT = (
+    "stages/poses/parameters.py",
+    "stages/poses/stage.py",
+    "stages/poses/world.py",
+    "stages/poses/xfeat.py",
+)
 POSES = "poses --out out --sequence {walks}/"
+
+
+def no_network(folder: Path) -> None:
+    (folder / "no.onnx").write_bytes(b"no network")
 
 
 def four_poses(folder: Path) -> None:
@@ -36,6 +45,31 @@ ROWS = [
         f"{POSES}unposed --method rgbd --no-use-color",
         right=four_poses,
     ),
+    Tried(
+        OPTIONS,
+        "--features needs",
+        f"{POSES}unposed --features no.onnx --method sfm --dry-run",
+        f"{POSES}unposed --method sfm --dry-run",
+        given=no_network,
+    ),
+    Tried(
+        XFEAT,
+        "leave --features out",
+        f"{POSES}unposed --features no.onnx",
+        f"{POSES}unposed",
+        code=3,
+        given=no_network,
+        right=four_poses,
+    ),
+    Tried(
+        WORLD,
+        "use --method rgbd",
+        f"{POSES}unposed --method refine",
+        f"{POSES}unposed --method rgbd",
+        code=3,
+        right=four_poses,
+    ),
+    NotTried(STAGE, "compare it with that of --method rgbd", "it says how to find out, and mends nothing"),
     *(
         Tried(
             STAGE,

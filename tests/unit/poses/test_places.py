@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply, transform_from
 from scenewright.stages.kit.registration.rigid_motion import between, distance_of
-from scenewright.stages.poses.features import Features, find_features, ransac_motion, rigid_motions
+from scenewright.stages.poses.features import Features, find_features, match_features, ransac_motion, rigid_motions
+from scenewright.stages.poses.loops import LEAST_WORDS
 from scenewright.stages.poses.places import Ferns, PlaceIndex, fern_likeness
 from scipy.spatial.transform import Rotation
 
@@ -28,6 +29,23 @@ def test_a_motion_is_found_among_wrong_matches() -> None:
     found = ransac_motion(made_up(moved, descriptors), made_up(points, descriptors), random)
     assert found is not None and found.inliers >= 35
     np.testing.assert_allclose(found.target_from_source, motion, atol=0.02)
+
+
+def test_places_and_matches_of_descriptors_of_real_numbers() -> None:
+    random = np.random.default_rng(1)
+    descriptors = random.normal(size=(60, 64)).astype(np.float32)
+    descriptors /= np.linalg.norm(descriptors, axis=1, keepdims=True)
+    again = descriptors[::-1] + random.normal(0, 0.03, (60, 64)).astype(np.float32)
+    again /= np.linalg.norm(again, axis=1, keepdims=True)
+    again[:20] = -again[:20]
+    points = np.zeros((60, 3))
+    pairs = match_features(made_up(points, descriptors), made_up(points, again))
+    assert pairs.tolist() == [[59 - k, k] for k in range(20, 60)]
+    index = PlaceIndex(random)
+    for seen in (descriptors, random.normal(size=(60, 64)), again):
+        index.add(seen)
+    likeness = index.scores(2)
+    assert likeness[0] > LEAST_WORDS > 2 * likeness[1]
 
 
 def test_points_on_a_line_fix_no_motion() -> None:

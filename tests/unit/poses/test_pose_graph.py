@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scenewright.stages.kit.geometry.transforms import inverse
-from scenewright.stages.kit.registration.pose_graph import Edge, laid_out, optimize, parts_of
+from scenewright.stages.kit.registration.pose_graph import Edge, laid_out, optimize, optimize_gradually, parts_of
 from scenewright.stages.kit.registration.rigid_motion import angle_of, between, distance_of, exponential
 
 SURE = np.eye(6) * 1e4
@@ -55,6 +55,27 @@ def test_a_ring_with_known_drift_closes() -> None:
     assert np.array_equal(found.world_from_node[0], true[0]) or np.allclose(
         found.world_from_node[0], true[0], atol=1e-9
     )
+
+
+def test_a_ring_that_drifted_far_closes_and_denies_wrong_loops() -> None:
+    """Half a metre of drift is nothing that a loop of 3 mm would believe; wrong loops contradict each other as well."""
+    true, wrong = ring(24), exponential(np.array([0.3, 0.0, 0.5, 1.0, -0.8, 0.4]))
+    drift = exponential(np.array([0.0, 0.0, 0.012, 0.02, 0.0, 0.0]))
+    edges = [Edge(k, k + 1, between(true[k], true[k + 1]) @ drift, SURE) for k in range(23)]
+    drifted = [true[0]]
+    for edge in edges:
+        drifted.append(drifted[-1] @ edge.target_from_source)
+    pairs = [(0, 23), (1, 22), (0, 22), (3, 15), (6, 18)]
+    edges += [
+        Edge(a, b, between(true[a], true[b]) @ (wrong if b < 20 else np.eye(4)), SURE * 10, switchable=True)
+        for a, b in pairs
+    ]
+    far = [distance_of(between(a, b)) for a, b in zip(true, drifted, strict=True)]
+    found = optimize_gradually(np.array(drifted), edges)
+    near = [distance_of(between(a, b)) for a, b in zip(true, found.world_from_node, strict=True)]
+    assert far[-1] > 0.5 and near[-1] < 0.05 and max(near) < 0.35 * max(far)
+    assert (found.weights[-5:] > 0.5).tolist() == [True, True, True, False, False]
+    assert (optimize(np.array(drifted), edges).weights[-5:] < 0.5).all(), "from there it believes none"
 
 
 def test_exact_edges_leave_exact_poses() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from scenewright.stages.kit.formats.trajectories import read_tum
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.measurement.pose_error import trajectory_error
 from scenewright.stages.kit.progress import SilentProgress
+from scenewright.stages.kit.registration.rigid_motion import between, exponential
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.poses.contradiction import contradicted
 from scenewright.stages.poses.frame_poses import FramePose
@@ -90,6 +92,65 @@ def test_poses_of_the_sequence_are_only_its_world(tmp_path: Path) -> None:
     np.testing.assert_allclose(inverse(own[3]) @ own[9], inverse(found[3]) @ found[9], atol=1e-6)
 
 
+def drifted(true: np.ndarray, turn: float, stretch: float) -> np.ndarray:
+    """Poses (N, 4, 4) whose every step turns by so much too much [rad] and is so many times as long."""
+    result, bend = [true[0]], exponential(np.array([0.0, turn, 0.0, 0.0, 0.0, 0.0]))
+    for motion in inverse_steps(true):
+        motion[:3, 3] *= stretch
+        result.append(result[-1] @ motion @ bend)
+    return np.array(result)
+
+
+def inverse_steps(poses: np.ndarray) -> list[np.ndarray]:
+    return [inverse(a) @ b for a, b in pairwise(poses)]
+
+
+def end_error(path: np.ndarray, true: np.ndarray = WALK) -> float:
+    """Distance by which the last pose is off, seen from the first [m]."""
+    return float(np.linalg.norm((between(path[0], path[-1]) - between(true[0], true[-1]))[:3, 3]))
+
+
+def test_given_poses_that_drift_are_refined(tmp_path: Path) -> None:
+    """Once round and 14 degrees too far: the loop of the whole way is 8 cm from where the given poses put it."""
+    given = drifted(WALK, np.radians(0.3), 1.05)
+    sequence = write_sequence(tmp_path / "sequence", WALK, with_pose=True, given=given)
+    made = poses(sequence, tmp_path / "poses", method="refine")
+    before = trajectory_error(0.1 * np.arange(FRAMES), WALK, 0.1 * np.arange(FRAMES), given)
+    found = read_tum(made.path("trajectory.tum"))[1]
+    assert before is not None and before.rmse_aligned > 0.03 and end_error(given) > 0.07
+    assert made.outcome == "ok" and made.info.method == "refine"
+    assert aligned_error(made) < 0.1 * before.rmse_aligned and end_error(found) < 0.1 * end_error(given)
+    assert made.info.world == "sequence"  # about where the given poses are
+    np.testing.assert_allclose((found - given)[:, :3, 3].mean(axis=0), 0, atol=1e-6)
+
+
+def test_given_poses_that_are_right_stay(tmp_path: Path) -> None:
+    short = WALK[:16]
+    sequence = write_sequence(tmp_path / "sequence", short, with_pose=True)
+    found = read_tum(poses(sequence, tmp_path / "poses", method="refine").path("trajectory.tum"))[1]
+    assert np.linalg.norm((found - short)[:, :3, 3], axis=1).max() < 0.003
+
+
+def test_a_jump_of_given_poses_that_the_depth_denies(tmp_path: Path) -> None:
+    """A phone that finds itself again moves its world: the motion of that step is that of the depth."""
+    short = WALK[:16]
+    given = short.copy()
+    given[8:] = exponential(np.array([0.0, 0.0, 0.1, 0.3, -0.2, 0.1])) @ given[8:]
+    sequence = write_sequence(tmp_path / "sequence", short, with_pose=True, given=given)
+    made = poses(sequence, tmp_path / "poses", method="refine", loop_closure=False)
+    assert made.outcome == "ok" and aligned_error(made, short) < 0.005
+
+
+def test_frames_that_the_given_poses_or_the_depth_lack(tmp_path: Path) -> None:
+    """Blank frames stay where they were put; what nobody placed is looked for."""
+    short = WALK[:16]
+    sequence = write_sequence(
+        tmp_path / "sequence", short, with_pose=True, blank=(6, 7), given=[*short[:11], None, None, *short[13:]]
+    )
+    made = poses(sequence, tmp_path / "poses", method="refine")
+    assert made.outcome == "ok" and aligned_error(made, short) < 0.005
+
+
 def test_depth_alone(tmp_path: Path) -> None:
     corner = WALK[4:10]  # before a plain wall depth alone would slide
     sequence = write_sequence(tmp_path / "sequence", corner, with_color=False)
@@ -144,6 +205,7 @@ def test_all_frames_blank(tmp_path: Path) -> None:
         (3, {"with_color": False}, {"method": "sfm"}, "have no colour"),
         (3, {"with_color": False}, {"bundle_adjustment": True}, "have no colour"),
         (3, {}, {"world": "sequence"}, "has a pose in the sequence"),
+        (3, {}, {"method": "refine"}, "has a pose in the sequence"),
     ],
 )
 def test_bad_input_is_one_line(
@@ -158,6 +220,9 @@ def test_bad_input_is_one_line(
 def test_options_that_do_not_go_together() -> None:
     with pytest.raises(UsageError, match="sfm needs colour"):
         check(PosesParameters(method="sfm", use_color=False), {})
+    for parameters in (PosesParameters(method="sfm"), PosesParameters(use_color=False)):
+        with pytest.raises(UsageError, match="--features"):
+            check(parameters, {"features": "xfeat"})
     with pytest.raises(UsageError, match="bundle-adjustment needs colour"):
         check(PosesParameters(bundle_adjustment=True, use_color=False), {})
 

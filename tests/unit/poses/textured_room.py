@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -64,25 +64,30 @@ def write_sequence(
     poses: np.ndarray,
     *,
     with_pose: bool = False,
+    given: Iterable[np.ndarray | None] | None = None,
     with_color: bool = True,
     with_depth: bool = True,
     blank: Collection[int] = (),
 ) -> Sequence:
-    """Write a sequence of the room seen from `poses`; the frames in `blank` see black and no depth."""
+    """Write a sequence of the room seen from `poses`; the frames in `blank` see black and no depth.
+
+    With `with_pose` it says that they are `given`, by default where they are; None: nowhere.
+    """
+    said = list(poses if given is None else given)
     root.mkdir(parents=True)
     streams = [name for name, there in (("color", with_color), ("depth", with_depth), ("pose", with_pose)) if there]
     random = np.random.default_rng(0)
     with FrameWriter(root / "frames.mcap", CAMERA, world_up="unknown") as writer:
-        for index, pose in enumerate(poses):
+        for index, (pose, told) in enumerate(zip(poses, said, strict=True)):
             color, depth = render(pose)
             depth += random.normal(0.0, 0.002, depth.shape).astype(np.float32)
             if index in blank:
                 color, depth = np.zeros_like(color), np.zeros_like(depth)
             writer.write(
-                0.1 * index, color if with_color else None, depth if with_depth else None, pose if with_pose else None
+                0.1 * index, color if with_color else None, depth if with_depth else None, told if with_pose else None
             )
-    posed = poses if with_pose else poses[:0]
-    write_tum(root / "trajectory.tum", 0.1 * np.arange(len(posed)), posed)
+    posed = [k for k, told in enumerate(said) if with_pose and told is not None]
+    write_tum(root / "trajectory.tum", 0.1 * np.array(posed), np.array([said[k] for k in posed]).reshape(-1, 4, 4))
     SequenceFile(
         source_format="test",
         rule="test",

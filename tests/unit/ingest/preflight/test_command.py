@@ -49,6 +49,7 @@ CAMERA_KEYS = {
     "registration",
     "pictures",
     "motion",
+    "drift",
     "stereo",
 }
 
@@ -89,7 +90,8 @@ def test_ready_log(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_command_to_run_is_ready_to_paste(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ("--fx", CAMERA.fx, "--fy", CAMERA.fy, "--cx", CAMERA.cx, "--cy", CAMERA.cy)
+    options = ["--fx", CAMERA.fx, "--fy", CAMERA.fy, "--cx", CAMERA.cx, "--cy", CAMERA.cy, "--frame-rate", 15]
+    options += ["--pose-scale", 1, "--pose-convention", "as-is", "--depth-bits", "as-is", "--depth-scale", 1000]
     code, out, _ = inspect(capsys, good, "--quiet", *map(str, options))
     (line,) = [line for line in out.splitlines() if line.startswith("run it")]
     words = shlex.split(line.removeprefix("run it"))
@@ -97,6 +99,7 @@ def test_the_command_to_run_is_ready_to_paste(good: Path, capsys: pytest.Capture
     assert code == 0 and words[start : start + 4] == ["run", "reconstruct", "--set", f"log={good}"]
     given = dict(pair.split("=", 1) for pair in words if "=" in pair)
     assert float(given["fx"]) == CAMERA.fx and float(given["cy"]) == CAMERA.cy
+    assert float(given["frame_rate"]) == 15 and given["depth_bits"] == given["pose_convention"] == "as-is"
     pipeline = read_pipeline(pipeline_path("reconstruct"))
     check_given_inputs(pipeline, resolve_variables(pipeline, given))  # it would be taken
 
