@@ -62,19 +62,12 @@ class FrameSource:
     def seen(self, index: int) -> Seen:
         """Read a frame. Its features are found when they are asked for."""
         parameters, camera = self._parameters, self.camera
-        streams = ("depth", "deviation")
-        frame = self._reader.read(index, ("color", *streams) if parameters.use_color else streams)
+        frame = self._reader.read(index, ("color", "depth") if parameters.use_color else ("depth",))
         color, depth = frame.color, frame.depth
         if depth is None:
             depth = np.zeros((camera.height, camera.width), dtype=np.float32)
         pyramid = build_pyramid(
-            depth,
-            color,
-            camera,
-            width=parameters.width,
-            levels=LEVELS,
-            maximum_depth=parameters.maximum_depth,
-            deviation=frame.deviation,
+            depth, color, camera, width=parameters.width, levels=LEVELS, maximum_depth=parameters.maximum_depth
         )
 
         def describe() -> Features:

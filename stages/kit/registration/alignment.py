@@ -1,9 +1,9 @@
 """Dense alignment of two frames: point-to-plane distance and brightness difference together, Gauss-Newton.
 
 The hybrid objective of Park, Zhou and Koltun (Colored point cloud registration revisited, ICCV 2017) with projective
-association (KinectFusion, Newcombe 2011), weights by the deviations that both frames state, else by the sensor's noise
-at each depth (Nguyen, Izadi and Lovell 2012), and gain and bias of the exposure estimated along. One thread adds up in
-one order, so that the same frames give the same bits; Open3D's parallel sums do not.
+association (KinectFusion, Newcombe 2011), weights by the sensor's noise at each depth (Nguyen, Izadi and Lovell 2012),
+and gain and bias of the exposure estimated along. One thread adds up in one order, so that the same frames give the
+same bits; Open3D's parallel sums do not.
 """
 
 from __future__ import annotations
@@ -88,8 +88,6 @@ def _accumulate(
     target_points, target_normals = target.points, target.normals
     target_brightness, target_gradient = target.brightness, target.gradient
     source_points, source_normals, source_brightness = source.points, source.normals, source.brightness
-    target_deviation, source_deviation = target.deviation, source.deviation
-    states_deviation = target_deviation.shape[0] > 0 and source_deviation.shape[0] > 0
     stride, gate, tolerance, use_color = comparison
     fx, fy, cx, cy = target.intrinsics
     height, width = target_points.shape[:2]
@@ -116,10 +114,7 @@ def _accumulate(
             z_target = target_points[vt, ut, 2]
             if z_target <= 0:
                 continue
-            random = 0.0012 + 0.0019 * (q2 - 0.4) ** 2
-            if states_deviation and source_deviation[v, u] > 0 and target_deviation[vt, ut] > 0:
-                random = np.sqrt(0.5 * (source_deviation[v, u] ** 2 + target_deviation[vt, ut] ** 2))
-            noise = np.hypot(random, SYSTEMATIC_DEPTH * q2)
+            noise = np.hypot(0.0012 + 0.0019 * (q2 - 0.4) ** 2, SYSTEMATIC_DEPTH * q2)
             reach = gate + 2 * noise
             if q2 - z_target > reach:
                 sums[HIDDEN] += 1

@@ -29,8 +29,6 @@ class Level(NamedTuple):
     """(H, W) float32 in [0, 1]; -1 where it is not known, which includes everywhere without colour."""
     gradient: np.ndarray
     """(H, W, 2) float32, change of the brightness per pixel along u and v."""
-    deviation: np.ndarray
-    """(H, W) float32, standard deviation of depth [m], 0 where it is not known; (0, 0) where a frame states none."""
 
 
 @dataclass(frozen=True)
@@ -115,22 +113,13 @@ def _points_and_normals(
 
 
 def build_pyramid(
-    depth: np.ndarray,
-    color: np.ndarray | None,
-    camera: Camera,
-    *,
-    width: int,
-    levels: int,
-    maximum_depth: float,
-    deviation: np.ndarray | None = None,
+    depth: np.ndarray, color: np.ndarray | None, camera: Camera, *, width: int, levels: int, maximum_depth: float
 ) -> Pyramid:
     """Return the pyramid of a frame.
 
-    `depth` is (H, W) float32 [m], 0 invalid; `color` is (H, W, 3) uint8 RGB or None; `deviation` is (H, W) float32 [m],
-    0 unknown, or None. The finest level is the frame halved until it is at most `width` wide; depth beyond
-    `maximum_depth` [m] is left out.
+    `depth` is (H, W) float32 [m], 0 invalid; `color` is (H, W, 3) uint8 RGB or None. The finest level is the frame
+    halved until it is at most `width` wide; depth beyond `maximum_depth` [m] is left out.
     """
-    spread = np.zeros((0, 0), np.float32) if deviation is None else np.asarray(deviation, np.float32)
     depth = np.where(depth <= maximum_depth, depth, np.float32(0)).astype(np.float32)
     intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
     gray = None
@@ -138,7 +127,6 @@ def build_pyramid(
         gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY).astype(np.float32) / np.float32(255)
     while depth.shape[1] > width and min(depth.shape) >= 4:
         depth, gray, intrinsics = _half(depth, gray, intrinsics)
-        spread = _largest_of_four(spread)
     valid = depth > 0
     finest = depth
     built = []
@@ -147,18 +135,11 @@ def build_pyramid(
             if min(depth.shape) < 24:
                 break  # nothing can be told apart on so few pixels
             depth, gray, intrinsics = _half(depth, gray, intrinsics)
-            spread = _largest_of_four(spread)
         points, normals = _points_and_normals(depth, intrinsics, DEPTH_JUMP, 2 if number == 0 else 1)
         smooth, gradient = _smoothed(gray, depth.shape)
-        built.append(Level(intrinsics, points, normals, smooth, gradient, spread))
+        built.append(Level(intrinsics, points, normals, smooth, gradient))
     share = float(valid.mean())
     return Pyramid(tuple(built), gray is not None, share, float(np.median(finest[valid])) if share > 0 else 0.0)
-
-
-def _largest_of_four(values: np.ndarray) -> np.ndarray:
-    """Return (H // 2, W // 2): errors of depth next to each other are alike and do not average out."""
-    height, width = values.shape[0] // 2, values.shape[1] // 2
-    return np.ascontiguousarray(values[: 2 * height, : 2 * width].reshape(height, 2, width, 2).max(axis=(1, 3)))
 
 
 def _smoothed(gray: np.ndarray | None, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -36,20 +36,6 @@ def test_exposure_does_not_move_the_camera() -> None:
     assert distance_of(wrong) < 0.004 and angle_of(wrong) < 0.004
 
 
-def test_depth_that_is_said_to_be_doubtful_hardly_counts() -> None:
-    image, depth = render(TARGET @ MOTION)
-    wrong_depth = depth.copy()
-    wrong_depth[:, :60] *= 1.04
-    deviation = np.where(wrong_depth == depth, np.float32(0.005), np.float32(0.1))
-    errors = []
-    for stated in (None, deviation):
-        options = {"width": 160, "levels": 3, "maximum_depth": 4.5, "deviation": stated}
-        target = build_pyramid(render(TARGET)[1], None, CAMERA, **options)
-        source = build_pyramid(wrong_depth, None, CAMERA, **options)
-        errors.append(distance_of(between(MOTION, align(target, source, np.eye(4)).target_from_source)))
-    assert errors[0] > 0.01 and errors[1] < 0.3 * errors[0]
-
-
 def test_a_wrong_pose_floats() -> None:
     target, source = pyramid(TARGET), pyramid(TARGET @ MOTION)
     right = judge(target, source, MOTION)
@@ -67,24 +53,12 @@ def test_a_blank_wall_is_uncertain() -> None:
     np.testing.assert_allclose(found.target_from_source, np.eye(4), atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("z", "deviation", "noise"),
-    [
-        (0.4, None, 0.0012),
-        (1.5, None, 0.0012 + 0.0019 * 1.1**2),
-        (4.0, None, 0.0012 + 0.0019 * 3.6**2),
-        (1.5, 0.03, 0.03),
-        (1.5, 0.0, 0.0012 + 0.0019 * 1.1**2),
-    ],
-)
-def test_a_wall_is_known_as_well_as_noise_and_systematic_error_allow(
-    z: float, deviation: float | None, noise: float
-) -> None:
+@pytest.mark.parametrize("z", [0.4, 1.5, 4.0])
+def test_a_wall_is_known_as_well_as_noise_and_systematic_error_allow(z: float) -> None:
     depth = np.full((CAMERA.height, CAMERA.width), z, dtype=np.float32)
-    stated = None if deviation is None else np.full_like(depth, deviation)
-    wall = build_pyramid(depth, None, CAMERA, width=160, levels=3, maximum_depth=4.5, deviation=stated)
+    wall = build_pyramid(depth, None, CAMERA, width=160, levels=3, maximum_depth=4.5)
     points = np.count_nonzero(wall.levels[0].normals[::2, ::2, 2])
-    variance = noise**2 + (0.005 * z) ** 2
+    variance = (0.0012 + 0.0019 * (z - 0.4) ** 2) ** 2 + (0.005 * z) ** 2
     known = judge(wall, wall, np.eye(4)).information
     assert known[5, 5] == pytest.approx(0.01 * points / variance, rel=1e-3)
     assert np.abs(known[:, 3:5]).max() < 1e-6 * known[5, 5]
