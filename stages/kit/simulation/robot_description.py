@@ -119,22 +119,31 @@ class _RobotFile(BaseModel):
 
 def description_files(robot: str) -> tuple[Path, ...]:
     """Return the files that describe a robot, as far as they are the project's or the user's: its description, the one
-    that it is `like`, and its URDF. Those that are missing are left out, but for the first."""
+    that it is `like`, and its URDF; of the last two those that are there. Raises UsageError (no such robot)."""
     path = description_path(robot)
-    if not path.is_file():
-        return (path,)
     values = file_toml(path, error=UsageError, hint=HINT)
-    found = [path]
+    found, folder = [path], path.parent
     if isinstance(values.get("like"), str):
         found.append(FOLDER / f"{values['like']}.toml")
+        folder = folder if "urdf" in values else FOLDER
         values = (file_toml(found[1], error=UsageError, hint=HINT) if found[1].is_file() else {}) | values
-    found.append(path.parent / str(values.get("urdf", "")))
+    found.append(folder / str(values.get("urdf", "")))
     return tuple(found[:1] + [file for file in found[1:] if file.is_file()])
 
 
 def description_path(robot: str) -> Path:
-    """Return the description of a robot, given by the name of one of data/robots or by the path of a .toml file."""
-    return Path(robot) if robot.endswith(".toml") else FOLDER / f"{robot}.toml"
+    """Return the description of a robot, given by the name of one of data/robots or by the path of a .toml file. Raises
+    UsageError (no such robot)."""
+    path = Path(robot) if robot.endswith(".toml") else FOLDER / f"{robot}.toml"
+    if not path.is_file():
+        names = ", ".join(robot_names())
+        raise UsageError(f"no robot is called {robot!r}", hint=f"known: {names}, or a description of your own (.toml)")
+    return path
+
+
+def robot_names() -> list[str]:
+    """Return the names of the robots of data/robots."""
+    return sorted(entry.stem for entry in FOLDER.glob("*.toml"))
 
 
 def load_robot(robot: str) -> RobotDescription:
@@ -145,9 +154,6 @@ def load_robot(robot: str) -> RobotDescription:
     URDF), MissingDependency (its URDF is not there).
     """
     path = description_path(robot)
-    if not path.is_file():
-        names = ", ".join(sorted(entry.stem for entry in FOLDER.glob("*.toml")))
-        raise UsageError(f"no robot is called {robot!r}", hint=f"known: {names}, or a description of your own (.toml)")
     values = file_toml(path, error=BadInput, hint=HINT)
     folder = path.parent
     if (like := values.pop("like", None)) is not None:

@@ -120,7 +120,7 @@ def test_an_arm_whose_axes_are_not_z_is_the_same_arm(tmp_path: Path) -> None:
 def test_the_files_of_a_description_are_what_a_run_depends_on(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text('like = "kinova_gen3"\npedestal_height = 0.6\n')
     named = description_files(str(tmp_path / "own.toml"))
-    assert named[:2] == (tmp_path / "own.toml", FOLDER / "kinova_gen3.toml")
+    assert named == (tmp_path / "own.toml", FOLDER / "kinova_gen3.toml", FOLDER / "kinova_gen3.urdf")
     assert load_robot(str(tmp_path / "own.toml")).pedestal_height == 0.6
     assert FOLDER / "kinova_gen3.urdf" in description_files("kinova_gen3")
 
