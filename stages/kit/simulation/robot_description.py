@@ -44,6 +44,8 @@ class RobotDescription:
     arm_forces: np.ndarray
     """(J,) most that the motor of each joint gives [N m]."""
     carry: np.ndarray
+    look: np.ndarray | None
+    """(J,) arm that holds a wrist camera over a surface in front; None: found when it is needed."""
     tip_overhang: float
     opening: float
     palm: tuple[float, float]
@@ -104,6 +106,7 @@ class _RobotFile(BaseModel):
     arm_acceleration: Positive
     arm_forces: tuple[Positive, ...]
     carry: Angles
+    look: Angles | None = None
     tip_overhang: NotNegative
     opening: Positive
     palm: tuple[Positive, Positive]
@@ -169,7 +172,9 @@ def load_robot(robot: str) -> RobotDescription:
     urdf = folder / described["urdf"]
     if not urdf.is_file():
         urdf = _installed(Path(described["urdf"]))
-    for key in ("lower", "upper", "arm_forces", "carry"):
+    for key in ("lower", "upper", "arm_forces", "carry", "look"):
+        if described[key] is None:
+            continue
         if len(described[key]) != len(described["arm_joints"]):
             wanted = len(described["arm_joints"])
             raise BadInput(f"{path}: {key} has {len(described[key])} values for {wanted} arm joints", hint=HINT)
@@ -181,8 +186,14 @@ def load_robot(robot: str) -> RobotDescription:
 
 def _check_joints(robot: RobotDescription, path: Path) -> None:
     """Raise BadInput where a description and its URDF do not fit each other."""
-    if np.any(robot.lower >= robot.upper) or np.any(robot.carry < robot.lower) or np.any(robot.carry > robot.upper):
-        raise BadInput(f"{path}: lower < upper and lower <= carry <= upper do not hold of every joint", hint=HINT)
+    for number, joint in enumerate(robot.arm_joints):
+        low, high = robot.lower[number], robot.upper[number]
+        if low >= high:
+            raise BadInput(f"{path}: joint {joint!r}: lower {low:g} is not below upper {high:g}", hint=HINT)
+        for key, arm in (("carry", robot.carry), ("look", robot.look)):
+            if arm is not None and not low <= arm[number] <= high:
+                problem = f"joint {joint!r}: {key} {arm[number]:g} is outside its limits {low:g} to {high:g}"
+                raise BadInput(f"{path}: {problem}", hint=HINT)
     root = read_urdf(robot.urdf)
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
     links = {link.get("name") for link in root.findall("link")}

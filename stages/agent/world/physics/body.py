@@ -43,10 +43,11 @@ class PhysicsBody:
         rates: Rates,
         seed: int,
         segmenter: AskedSegmenter | None = None,
+        robot: str = "panda",
     ) -> None:
         rates = replace(rates, hidden=0.0) if segmenter is None else replace(rates, hidden=0.0, feedback=0.0)
         self.apartment, self._room = apartment, Room(apartment)
-        self._robot = RobotInRoom(self._room, rates, seed)
+        self._robot = RobotInRoom(self._room, rates, seed, robot)
         self._asked = segmenter
         eyes = segmenter or NoisyOracle(self._room, SegmenterErrors(rates, self._robot.luck, sought))
         seen_by_robot = Seen(self._robot, CLEARANCE)
