@@ -6,7 +6,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -121,17 +121,25 @@ class _RobotFile(BaseModel):
 
 
 def description_files(robot: str) -> tuple[Path, ...]:
-    """Return the files that describe a robot, as far as they are the project's or the user's: its description, the one
-    that it is `like`, and its URDF; of the last two those that are there. Raises UsageError (no such robot)."""
-    path = description_path(robot)
-    values = file_toml(path, error=UsageError, hint=HINT)
-    found, folder = [path], path.parent
-    if isinstance(values.get("like"), str):
-        found.append(FOLDER / f"{values['like']}.toml")
+    """Return the files that describe a robot, as far as they are the project's or the user's: its description, those
+    that it is `like`, and its URDF where that is there. Raises as `load_robot` does of a description alone."""
+    paths, values, folder = _read(description_path(robot))
+    urdf = folder / str(values.get("urdf", ""))
+    return (*paths, urdf) if urdf.is_file() else paths
+
+
+def _read(path: Path) -> tuple[tuple[Path, ...], dict[str, Any], Path]:
+    """Return the files of a description and of those that it is `like`, what they say together, and the folder of the
+    one that names the URDF. Raises BadInput."""
+    paths, values, folder = [path], file_toml(path, error=BadInput, hint=HINT), path.parent
+    while (like := values.pop("like", None)) is not None:
+        other = FOLDER / f"{like}.toml"
+        if not other.is_file() or other in paths:
+            raise BadInput(f"{paths[-1]}: like = {like!r} is no other robot of data/robots", hint=HINT)
         folder = folder if "urdf" in values else FOLDER
-        values = (file_toml(found[1], error=UsageError, hint=HINT) if found[1].is_file() else {}) | values
-    found.append(folder / str(values.get("urdf", "")))
-    return tuple(found[:1] + [file for file in found[1:] if file.is_file()])
+        values = file_toml(other, error=BadInput, hint=HINT) | values
+        paths.append(other)
+    return tuple(paths), values, folder
 
 
 def description_path(robot: str) -> Path:
@@ -157,14 +165,7 @@ def load_robot(robot: str) -> RobotDescription:
     URDF), MissingDependency (its URDF is not there).
     """
     path = description_path(robot)
-    values = file_toml(path, error=BadInput, hint=HINT)
-    folder = path.parent
-    if (like := values.pop("like", None)) is not None:
-        other = FOLDER / f"{like}.toml"
-        if not other.is_file():
-            raise BadInput(f"{path}: like = {like!r} is no robot of data/robots", hint=HINT)
-        folder = folder if "urdf" in values else FOLDER
-        values = file_toml(other, error=BadInput, hint=HINT) | values
+    _, values, folder = _read(path)
     try:
         described = _RobotFile(**values).model_dump()
     except ValidationError as error:

@@ -122,13 +122,16 @@ def test_the_files_of_a_description_are_what_a_run_depends_on(tmp_path: Path) ->
     named = description_files(str(tmp_path / "own.toml"))
     assert named == (tmp_path / "own.toml", FOLDER / "kinova_gen3.toml", FOLDER / "kinova_gen3.urdf")
     assert load_robot(str(tmp_path / "own.toml")).pedestal_height == 0.6
-    assert FOLDER / "kinova_gen3.urdf" in description_files("kinova_gen3")
+    (tmp_path / "own.toml").write_text('like = "ur5e"\npedestal_height = 0.6\n')
+    files = description_files(str(tmp_path / "own.toml"))
+    assert files[1:] == tuple(FOLDER / name for name in ("ur5e.toml", "ur5.toml", "ur5e.urdf"))
+    assert load_robot(str(tmp_path / "own.toml")).urdf == FOLDER / "ur5e.urdf"
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ('like = "r2d2"', "no robot of data/robots"),
+        ('like = "r2d2"', "no other robot of data/robots"),
         ("speed = 3", "speed: Extra inputs"),
         ('arm_speed = "fast"', "arm_speed: Input should be a valid number"),
         ("arm_speed = nan", "arm_speed"),
