@@ -4,6 +4,7 @@ on a pedestal that drives or stands."""
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scenewright.schemas.errors import BadInput, MissingDependency, UsageError, first_problem
 from scenewright.schemas.outside import file_toml
 from scenewright.schemas.places import data_file
-from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from scenewright.stages.kit.simulation.urdf_split import mesh_file, read_urdf, with_absolute_meshes, without_visuals
 
 FOLDER = data_file("robots")
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
@@ -22,6 +23,9 @@ GROUND_CLEARANCE = 0.02
 """The pedestal hovers by this much: reconstructed floors are not flat to the millimetre."""
 JOINT_COUNTS = (6, 7)
 """Fewest and most: fewer cannot reach every pose, with more the planner was not tried."""
+FINGERS = 2
+MOST_RADIANS, MOST_DEGREES = 4 * np.pi, 1500.0
+"""No joint turns twice round to either side of zero, nor at two turns a second: what is more is in degrees."""
 HINT = "docs/MOTION.md (Robots) lists what a description says"
 
 
@@ -166,6 +170,7 @@ def load_robot(robot: str) -> RobotDescription:
     """
     path = description_path(robot)
     _, values, folder = _read(path)
+    _check_said(values, path)
     try:
         described = _RobotFile(**values).model_dump()
     except ValidationError as error:
@@ -183,6 +188,36 @@ def load_robot(robot: str) -> RobotDescription:
     description = RobotDescription(**described | {"urdf": urdf})
     _check_joints(description, path)
     return description
+
+
+def _check_said(values: dict[str, Any], path: Path) -> None:
+    """Raise BadInput for what a description lacks, an arm of other joints, a hand of other fingers, degrees, and a URDF
+    that lies elsewhere."""
+    lacking = [name for name, field in _RobotFile.model_fields.items() if field.is_required() and name not in values]
+    if lacking:
+        raise BadInput(f"{path}: does not say {', '.join(lacking)}", hint=HINT)
+    fewest, most = JOINT_COUNTS
+    if (count := _count(values["arm_joints"])) is not None and not fewest <= count <= most:
+        raise BadInput(f"{path}: arm_joints names {count}; an arm here has {fewest} or {most} joints", hint=HINT)
+    for key, what in (("finger_joints", "sliding joints"), ("finger_links", "links")):
+        if (count := _count(values[key])) is not None and count != FINGERS:
+            raise BadInput(f"{path}: {key} names {count}; a parallel gripper has {FINGERS} {what}", hint=HINT)
+    for key in ("lower", "upper", "carry", "look", "arm_speed"):
+        said = values.get(key)
+        for number in said if isinstance(said, list) else [said]:
+            if isinstance(number, int | float) and MOST_RADIANS < abs(number) <= MOST_DEGREES:
+                meant = f"{np.radians(number):.4g}"
+                raise BadInput(f"{path}: {key} says {number:g}, which looks like degrees", hint=f"in radians: {meant}")
+    named = values["urdf"]
+    if isinstance(named, str) and (".." in Path(named).parts or Path(named).is_absolute()):
+        raise BadInput(
+            f"{path}: urdf {named!r} is outside the folder of the description",
+            hint="put the URDF and its meshes beside the description, and name it from there",
+        )
+
+
+def _count(value: Any) -> int | None:
+    return len(value) if isinstance(value, list) else None
 
 
 def _check_joints(robot: RobotDescription, path: Path) -> None:
@@ -206,10 +241,21 @@ def _check_joints(robot: RobotDescription, path: Path) -> None:
             if kinds.get(name) not in allowed:
                 found = f"is {kinds[name]}" if name in kinds else "is not there"
                 raise BadInput(f"{path}: joint {name!r} of {robot.urdf.name} {found}, not {allowed[0]}", hint=HINT)
+    parents = Counter(child.get("link", "") for child in root.findall("joint/child"))
+    for link, count in parents.items():
+        if count > 1:
+            raise BadInput(
+                f"{path}: link {link!r} of {robot.urdf.name} hangs from {count} joints: the arm is not serial",
+                hint="leave the linkage out, one joint to each link",
+            )
     moving = [name for name in joints_between(root, robot.arm_base, robot.tool_link) if kinds[name] != "fixed"]
     if moving != list(robot.arm_joints):
         what = ", ".join(moving) or "none"
         raise BadInput(f"{path}: from arm_base to tool_link move {what}: not arm_joints in their order", hint=HINT)
+    for mesh in root.findall("link/collision/geometry/mesh"):
+        if not mesh_file(mesh, robot.urdf.parent).is_file():
+            name = mesh.get("filename", "")
+            raise BadInput(f"{path}: {robot.urdf.name}: mesh {name!r} is not there", hint="put it beside the URDF")
 
 
 def joints_between(root: ElementTree.Element, base: str, tip: str) -> list[str]:
