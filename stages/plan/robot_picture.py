@@ -74,4 +74,5 @@ def _arrows(axes: Axes, pose: np.ndarray, plane: tuple[int, int], length: float)
         if np.linalg.norm(way) < 0.2 * length:
             continue
         axes.plot(*np.array([start, start + way]).T, color=color, linewidth=2.4, solid_capstyle="butt", zorder=4)
-        axes.text(*(start + 1.2 * way), name, color=color, ha="center", va="center", zorder=4)
+        beyond = start + 1.2 * way
+        axes.text(float(beyond[0]), float(beyond[1]), name, color=color, ha="center", va="center", zorder=4)
