@@ -25,6 +25,8 @@ FR3_UPPER = np.array([5.3093, 1.5133, 2.4937, -0.4461, 2.48, 4.2094, 5.7995])
 """Upper joint limits [rad] of the published environment (docs/LLM3.md)."""
 HOME = np.array([0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4])
 """Home configuration [rad], Franka's own."""
+ROBOT = "panda"
+"""The arm of the published environment."""
 SEARCHES = 10
 """Random seeds of the numeric search, beside the nearest planar configuration and the home one."""
 LEAN_OUT = np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0])
@@ -51,6 +53,10 @@ class ToolPose:
         return np.array([[c, s, 0, self.x], [s, -c, 0, self.y], [0, 0, -1, self.z], [0, 0, 0, 1.0]])
 
 
+HOME_POSE = ToolPose(0.306891, 0.0, 0.485302, 0.0)
+"""Pose of the tool at the home configuration."""
+
+
 @dataclass(frozen=True)
 class _Lengths:
     """The measures of the planar arm [m], out of the chain."""
@@ -71,7 +77,10 @@ class _Lengths:
 class FixedArm:
     """Inverse kinematics of downward tool poses of the arm at the origin."""
 
-    def __init__(self, limits: Limits = "fr3", robot: str = "panda") -> None:
+    closed = True
+    home, home_pose = HOME, HOME_POSE
+
+    def __init__(self, limits: Limits = "fr3", robot: str = ROBOT) -> None:
         description = load_robot(robot)
         if limits == "fr3":
             description = replace(description, lower=FR3_LOWER, upper=FR3_UPPER)
@@ -188,7 +197,7 @@ class FixedArm:
         return self._numeric[key]
 
 
-def panda_lengths(chain: ArmChain) -> np.ndarray | None:
+def planar_lengths(chain: ArmChain) -> np.ndarray | None:
     """Return shoulder height, upper arm, elbow offset, forearm, wrist offset (5,) [m]; None for another build."""
     if len(chain.fixed) != 7:
         return None
@@ -205,7 +214,7 @@ def panda_lengths(chain: ArmChain) -> np.ndarray | None:
 
 def _measures(chain: ArmChain) -> _Lengths:
     """Read the planar arm's measures out of the chain; raises ValueError when it is no arm of this shape."""
-    lengths = panda_lengths(chain)
+    lengths = planar_lengths(chain)
     if lengths is None or lengths[1:].min() <= 0:
         raise ValueError("not an arm of the Franka's shape")
     shoulder, upper, elbow, forearm, wrist = lengths.tolist()

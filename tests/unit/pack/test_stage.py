@@ -15,6 +15,7 @@ from scenewright.schemas.packing import Packing
 from scenewright.stages.kit.language.failures import LanguageFailed
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
+from scenewright.stages.pack.arm import FixedArm
 from scenewright.stages.pack.parameters import STAGE, PackParameters, Suite
 from scenewright.stages.pack.problem_file import from_file, read_problem, to_file
 from scenewright.stages.pack.stage import run
@@ -96,7 +97,7 @@ def test_wrong_problems_are_refused_in_one_line(tmp_path: Path, change: dict[str
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(PROBLEM | change))
     with pytest.raises(BadInput) as refused:
-        read_problem(path, "fr3")
+        read_problem(path, FixedArm())
     assert said in str(refused.value) and "\n" not in str(refused.value) and refused.value.hint
 
 
@@ -106,13 +107,13 @@ def test_any_bytes_are_a_problem_or_bad_input(tmp_path_factory: pytest.TempPathF
     path = tmp_path_factory.mktemp("problem") / "p.json"
     path.write_bytes(data)
     with pytest.raises(BadInput):
-        read_problem(path, "fr3")
+        read_problem(path, FixedArm())
 
 
 def test_a_problem_is_the_same_after_a_round_trip(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(PROBLEM))
-    instance = read_problem(path, "fr3")
+    instance = read_problem(path, FixedArm())
     assert from_file(to_file(instance), "mine") == instance
 
 
