@@ -7,17 +7,16 @@ from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.kit.formats.link_poses import link_poses
 from scenewright.stages.kit.formats.urdf_file import Urdf, parse_urdf
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 from scenewright.stages.kit.viewing.canvas import Canvas
 from scenewright.stages.kit.viewing.meshes import merged, shape_mesh
 
 ROBOT = "robot/"
-BY_DEFAULT = "panda"
-"""The robot where a manifest names none."""
 
 
 def robot_of(artifact: Artifact) -> str:
     """Return which robot an artifact was made for."""
-    return str(artifact.manifest.parameters.get("robot", BY_DEFAULT)) if artifact.manifest else BY_DEFAULT
+    return str(artifact.manifest.parameters.get("robot", USUAL_ROBOT)) if artifact.manifest else USUAL_ROBOT
 
 
 def draw_robot(canvas: Canvas, name: str) -> Urdf | None:

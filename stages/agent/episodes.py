@@ -28,9 +28,10 @@ from scenewright.stages.agent.obstacle_map import CELL, UNKNOWN
 from scenewright.stages.agent.pictures import Panel, animate_map, draw_growing_map, write_views
 from scenewright.stages.agent.scene_map import SceneMap
 from scenewright.stages.agent.session import Session, Turn
-from scenewright.stages.agent.trials import ROBOT, Setting, run_trial
+from scenewright.stages.agent.trials import Setting, run_trial
 from scenewright.stages.agent.world.truth import World
 from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 
 class RecordedBrain:
@@ -99,7 +100,7 @@ def write_episode(
     label: str,
     width: int,
     segmenter: str = "",
-    robot: str = ROBOT,
+    robot: str = USUAL_ROBOT,
 ) -> AgentEpisode:
     """Run a trial and write it down. `language` says, when it is over, what was asked of a model; `segmenter` is what
     the service that was asked for masks says it is, `robot` the name that its description has."""

@@ -49,7 +49,7 @@ class RunParameters(LanguageParameters, EyesParameters):
     simulation: Literal["fast", "physics"] = Field(
         "fast", description="Without contact, failures at given rates; or pybullet with rendered cameras (no doors)"
     )
-    robot: str = robot_option("panda", "with --simulation physics, and it drives")
+    robot: str = robot_option("with --simulation physics, and it drives")
     failures: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which executions fail")
     perception: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which the eyes err")
     turns: int = Field(150, ge=1, le=1000, description="Programs at most")
@@ -59,7 +59,7 @@ class RunParameters(LanguageParameters, EyesParameters):
 class ReplayParameters(EyesParameters):
     """Options of `agent replay`."""
 
-    robot: str = robot_option("panda", "the one that did the episode")
+    robot: str = robot_option("the one that did the episode")
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the picture [px]")
 
 

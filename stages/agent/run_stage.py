@@ -17,13 +17,14 @@ from scenewright.stages.agent.parameters import RunParameters
 from scenewright.stages.agent.segmenter_identity import identity_of
 from scenewright.stages.agent.session import Limits
 from scenewright.stages.agent.tasks import TASKS, make_apartment, make_household
-from scenewright.stages.agent.trials import ROBOT, Setting, goals_of, rules_brain
+from scenewright.stages.agent.trials import Setting, goals_of, rules_brain
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.reconstructed import apartment_of
 from scenewright.stages.kit.language.chat import Chat
 from scenewright.stages.kit.language.opening import open_chat
 from scenewright.stages.kit.language.scripted import ScriptedBackend
 from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 from scenewright.stages.kit.stage import Context
 
 
@@ -79,7 +80,7 @@ def run(
             label=brain.label,
             width=parameters.image_width,
             segmenter=identity_of(parameters.segmenter),
-            robot=load_robot(parameters.robot).name if parameters.simulation == "physics" else ROBOT,
+            robot=load_robot(parameters.robot).name if parameters.simulation == "physics" else USUAL_ROBOT,
         )
 
 

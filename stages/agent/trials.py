@@ -22,9 +22,8 @@ from scenewright.stages.agent.world.floor import Floor
 from scenewright.stages.agent.world.reconstructed import mapped
 from scenewright.stages.agent.world.truth import World
 from scenewright.stages.kit.rendering.segmenter_errors import Luck
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
-ROBOT = "panda"
-"""The robot of a trial where no other is named."""
 WorldName = Literal["fast", "physics"]
 
 
@@ -46,7 +45,7 @@ class Setting:
     """What was mapped of it before the robot came, as far as it is right."""
     segmenter: str = ""
     """Address of the segmentation service that the eyes ask in physics; empty: the oracle with errors."""
-    robot: str = ROBOT
+    robot: str = USUAL_ROBOT
     """Of data/robots/, or the path of a description; only in physics."""
 
 

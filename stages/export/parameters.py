@@ -88,7 +88,7 @@ class SceneExportParameters(Parameters):
 class PlanExportParameters(Parameters):
     """Options of `export plan`."""
 
-    robot: str = robot_option("panda", "the one that the plan is for")
+    robot: str = robot_option("the one that the plan is for")
 
 
 EXPORT = Stage(

@@ -14,6 +14,7 @@ from scenewright.stages.export.trajectory_files import Motion, csv_text, write_b
 from scenewright.stages.kit.formats.numpy_files import read_arrays
 from scenewright.stages.kit.formats.urdf_file import parse_urdf
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 from scenewright.stages.kit.stage import Context
 
 STARTS_ELSEWHERE = 1e-6
@@ -25,7 +26,7 @@ DRIVEN = 1e-6
 def run(plan: Plan, *, parameters: PlanExportParameters, context: Context) -> ExportedTrajectory:
     """Write the planned motion of every action. Raises BadInput for a plan of another robot."""
     robot = load_robot(parameters.robot)
-    planned_for = str(plan.manifest.parameters.get("robot", "panda")) if plan.manifest else parameters.robot
+    planned_for = str(plan.manifest.parameters.get("robot", USUAL_ROBOT)) if plan.manifest else parameters.robot
     if planned_for != parameters.robot:
         raise BadInput(
             f"{plan.root}: planned for --robot {planned_for}, not for {parameters.robot}",

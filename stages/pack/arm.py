@@ -17,6 +17,7 @@ from scenewright.stages.kit.motion.compiled_check import link_frames
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 Limits = Literal["fr3", "panda"]
 FR3_LOWER = np.array([-5.3093, -1.5133, -2.4937, -2.7478, -2.48, 0.8521, -5.7995])
@@ -25,8 +26,6 @@ FR3_UPPER = np.array([5.3093, 1.5133, 2.4937, -0.4461, 2.48, 4.2094, 5.7995])
 """Upper joint limits [rad] of the published environment (docs/LLM3.md)."""
 HOME = np.array([0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4])
 """Home configuration [rad], Franka's own."""
-ROBOT = "panda"
-"""The arm of the published environment."""
 SEARCHES = 10
 """Random seeds of the numeric search, beside the nearest planar configuration and the home one."""
 LEAN_OUT = np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0])
@@ -80,11 +79,11 @@ class FixedArm:
     closed = True
     home, home_pose = HOME, HOME_POSE
 
-    def __init__(self, limits: Limits = "fr3", robot: str = ROBOT) -> None:
+    def __init__(self, limits: Limits = "fr3", robot: str = USUAL_ROBOT) -> None:
         description = load_robot(robot)
         if limits == "fr3":
             description = replace(description, lower=FR3_LOWER, upper=FR3_UPPER)
-        self.limits = limits
+        self.limits, self.robot = limits, robot
         self.description: RobotDescription = description
         self.chain: ArmChain = arm_chain(description)
         self._lengths = _measures(self.chain)

@@ -16,16 +16,8 @@ import numpy as np
 from scenewright.stages.kit.motion.kinematics import arm_chain
 from scenewright.stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
 from scenewright.stages.kit.simulation.robot_description import load_robot
-from scenewright.stages.pack.arm import (
-    HOME,
-    HOME_POSE,
-    ROBOT,
-    FixedArm,
-    Limits,
-    ToolPose,
-    planar_joints,
-    planar_lengths,
-)
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
+from scenewright.stages.pack.arm import HOME, HOME_POSE, FixedArm, Limits, ToolPose, planar_joints, planar_lengths
 from scenewright.stages.pack.arm_scene import ArmScene
 from scenewright.stages.pack.hand import Named, end_collision, hand_blocks, held_block, tool_over_centre
 from scenewright.stages.pack.hand_shape import PUBLISHED, HandShape, measured
@@ -73,9 +65,9 @@ class Motion:
 class MotionPlanner:
     """Plans motions of the arm among upright blocks. Holds a pybullet client once one was needed; close it."""
 
-    def __init__(self, limits: Limits = "fr3", seed: int = 0, robot: str = ROBOT) -> None:
+    def __init__(self, limits: Limits = "fr3", seed: int = 0, robot: str = USUAL_ROBOT) -> None:
         self.arm = open_arm(limits, robot)
-        self.hand = PUBLISHED if robot == ROBOT else measured(self.arm.description)
+        self.hand = PUBLISHED if robot == USUAL_ROBOT else measured(self.arm.description)
         self.home = Stance(self.arm.home, self.arm.home_pose)
         self._scene: ArmScene | None = None
         self._seed = seed
@@ -216,7 +208,7 @@ class MotionPlanner:
 def open_arm(limits: Limits, robot: str) -> FixedArm | SolvedArm:
     """Return the kinematics of a robot: closed forms for one of the Franka's build, else a search. Raises as
     `load_robot` does, and BadInput for an arm that is too short for the scene."""
-    if robot == ROBOT:
+    if robot == USUAL_ROBOT:
         return FixedArm(limits)
     description = load_robot(robot)
     return FixedArm("panda", robot) if planar_lengths(arm_chain(description)) is not None else SolvedArm(description)

@@ -37,7 +37,7 @@ class PlanParameters(Parameters):
         description="Named priors such as in(bottle,fridge_2): a thing of this class is believed to be there, hidden "
         "by closed furniture; its pose and shape are seen once the furniture is open",
     )
-    robot: str = robot_option("panda")
+    robot: str = robot_option()
     stand: tuple[float, ...] = Field(
         (),
         description="Where the robot starts: x y [m] and yaw [deg]; one that does not drive stays there. Empty: where "

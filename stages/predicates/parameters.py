@@ -37,7 +37,7 @@ class TeachParameters(LanguageParameters):
         "simulated", description="Who teaches: `terminal` asks you, and keeps what you say in teacher.jsonl"
     )
     wrong: float = Field(0.0, ge=0.0, le=0.5, description="Share of corrections that are wrong or missing")
-    robot: str = robot_option("panda", IN_ROOMS)
+    robot: str = robot_option(IN_ROOMS)
 
 
 class PlanParameters(Parameters):
@@ -63,7 +63,7 @@ class EvaluateParameters(Parameters):
     )
     each: int = Field(10, ge=1, le=200, description="Tasks of each set, or of --scene")
     states: int = Field(1000, ge=10, le=20_000, description="States that each predicate is judged on")
-    robot: str = robot_option("panda", IN_ROOMS)
+    robot: str = robot_option(IN_ROOMS)
 
 
 def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:

@@ -8,11 +8,13 @@ from pydantic import Field
 from scenewright.schemas.errors import UsageError
 from scenewright.stages.kit.stage import Parameters
 
+USUAL_ROBOT = "panda"
+"""The robot of a step where no other is named, and of artifacts that name none."""
 DESCRIPTION = "Robot of data/robots/, or a description of your own (a .toml file)"
 
 
-def robot_option(default: str, where: str = "") -> Any:
-    """Return the field `robot` of a step's Parameters. `where` says in which runs there is an arm at all."""
+def robot_option(where: str = "", default: str = USUAL_ROBOT) -> Any:
+    """Return the field `robot` of a step's Parameters. `where` says in which runs there is an arm at all, or which."""
     return Field(default, description=f"{DESCRIPTION}{f'; {where}' if where else ''}")
 
 

@@ -228,7 +228,10 @@ def test_a_hand_is_measured_by_its_shapes() -> None:
 
 def test_an_arm_of_the_frankas_build_keeps_its_closed_forms(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text('like = "panda"\nname = "mine"\n')
-    assert isinstance(open_arm("fr3", str(tmp_path / "mine.toml")), FixedArm)
+    mine = MotionPlanner(robot=str(tmp_path / "mine.toml"))
+    assert isinstance(mine.arm, FixedArm)
+    motion = mine.plan(mine.home, ToolPose(0.5, 0.1, 0.1, 0.0), None, ())
+    assert motion.path.shape[1] == 7 and mine.mesh_calls == 0
     assert isinstance(open_arm("fr3", "ur5"), SolvedArm)
     with pytest.raises(UsageError, match="--limits panda are the Panda's"):
         check_inputs(PackParameters(robot="ur5", limits="panda"), {})
