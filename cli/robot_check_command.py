@@ -39,15 +39,16 @@ def check(
             for fault in faults:
                 out(f"{robot.name}: problem: {fault}")
         return BAD_INPUT
+    if folder is not None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise MachineFailure(f"--out {folder}: {error.strerror or error}", hint="give another folder") from None
     report = check_robot(robot)
     if folder is not None:
         from scenewright.stages.plan.robot_picture import draw_robot_check
 
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            draw_robot_check(folder / PICTURE, robot, report)
-        except OSError as error:
-            raise MachineFailure(f"--out {folder}: {error.strerror or error}", hint="give another folder") from None
+        draw_robot_check(folder / PICTURE, robot, report)
     if json_output:
         out(json.dumps({"file": file, "sound": not report.problems, **report.as_json()}))
     else:

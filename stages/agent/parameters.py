@@ -49,7 +49,7 @@ class RunParameters(LanguageParameters, EyesParameters):
     simulation: Literal["fast", "physics"] = Field(
         "fast", description="Without contact, failures at given rates; or pybullet with rendered cameras (no doors)"
     )
-    robot: str = robot_option("with --simulation physics, and it drives")
+    robot: str = robot_option("in physics, and one that drives")
     failures: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which executions fail")
     perception: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which the eyes err")
     turns: int = Field(150, ge=1, le=1000, description="Programs at most")

@@ -19,7 +19,7 @@ DomainName = Literal["store_objects", "set_table", "cook_meal"]
 SetName = Literal["canonical", "more_objects", "novel_goals", "combined", "hundred_goals"]
 SET_NAMES: tuple[SetName, ...] = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
 LIBRARIES = ("numpy", "pymunk", "numba")
-IN_ROOMS = "with --scene: what it reaches and how far its hand opens"
+IN_ROOMS = "in rooms: what it reaches and how far its hand opens"
 
 
 class TeachParameters(LanguageParameters):

@@ -46,7 +46,7 @@ class SimulateParameters(ActionTimes):
 
     policy: PolicyName = Field("ours", description="Who decides, one action for each look at the table")
     simulator: Literal["fast", "physics"] = Field("fast", description="The fitted time model, or contact physics")
-    robot: str = robot_option("with --simulator physics, where it stands beside the table", default="ur5_bench")
+    robot: str = robot_option("in physics, where it stands beside the table", default="ur5_bench")
     sight: Literal["truth", "image"] = Field(
         "truth", description="What the policy sees before each action: everything, or a new rendered image"
     )

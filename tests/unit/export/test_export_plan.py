@@ -64,8 +64,12 @@ def test_fingers_that_shut_between_two_rows_get_the_time_that_they_need() -> Non
 
 @pytest.fixture
 def plan(tmp_path: Path) -> Path:
-    """Two actions of an xArm: it drives with shut fingers, then reaches with open ones."""
-    root = tmp_path / "plan"
+    return write_plan(tmp_path)
+
+
+def write_plan(folder: Path) -> Path:
+    """Write two actions of an xArm: it drives with shut fingers, then reaches with open ones."""
+    root = folder / "plan"
     root.mkdir()
     moved = reaching()
     still = np.zeros((10, 9))
