@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
@@ -27,7 +28,7 @@ def run(plan: Plan, *, parameters: PlanExportParameters, context: Context) -> Ex
     """Write the planned motion of every action. Raises BadInput for a plan of another robot."""
     robot = load_robot(parameters.robot)
     planned_for = str(plan.manifest.parameters.get("robot", USUAL_ROBOT)) if plan.manifest else parameters.robot
-    if planned_for != parameters.robot:
+    if Path(planned_for).name != Path(parameters.robot).name:  # a description may be named from elsewhere
         raise BadInput(
             f"{plan.root}: planned for --robot {planned_for}, not for {parameters.robot}",
             hint=f"give --robot {planned_for}",
