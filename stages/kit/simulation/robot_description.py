@@ -152,6 +152,11 @@ def description_path(robot: str) -> Path:
     path = Path(robot) if robot.endswith(".toml") else FOLDER / f"{robot}.toml"
     if not path.is_file():
         names = ", ".join(robot_names())
+        if robot.endswith((".urdf", ".xacro")):
+            raise UsageError(
+                f"{robot}: a URDF says too little of a robot (gripper, limits, base)",
+                hint="write a description that names it (docs/ROBOT.md)",
+            )
         raise UsageError(f"no robot is called {robot!r}", hint=f"known: {names}, or a description of your own (.toml)")
     return path
 
@@ -231,6 +236,10 @@ def _check_joints(robot: RobotDescription, path: Path) -> None:
                 problem = f"joint {joint!r}: {key} {arm[number]:g} is outside its limits {low:g} to {high:g}"
                 raise BadInput(f"{path}: {problem}", hint=HINT)
     root = read_urdf(robot.urdf)
+    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
+        raise BadInput(
+            f"{path}: {robot.urdf.name} is xacro, not URDF", hint="expand it first: xacro FILE.xacro > FILE.urdf"
+        )
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
     links = {link.get("name") for link in root.findall("link")}
     for name in (robot.arm_base, robot.hand_link, robot.tool_link, *robot.finger_links):
@@ -250,12 +259,17 @@ def _check_joints(robot: RobotDescription, path: Path) -> None:
             )
     moving = [name for name in joints_between(root, robot.arm_base, robot.tool_link) if kinds[name] != "fixed"]
     if moving != list(robot.arm_joints):
+        if not joints_between(root, robot.arm_base, robot.tool_link):
+            raise BadInput(
+                f"{path}: {robot.tool_link!r} does not hang from {robot.arm_base!r}: tool_link, arm_base", hint=HINT
+            )
         what = ", ".join(moving) or "none"
         raise BadInput(f"{path}: from arm_base to tool_link move {what}: not arm_joints in their order", hint=HINT)
     for mesh in root.findall("link/collision/geometry/mesh"):
-        if not mesh_file(mesh, robot.urdf.parent).is_file():
+        file = mesh_file(mesh, robot.urdf.parent)
+        if not file.is_file():
             name = mesh.get("filename", "")
-            raise BadInput(f"{path}: {robot.urdf.name}: mesh {name!r} is not there", hint="put it beside the URDF")
+            raise BadInput(f"{path}: {robot.urdf.name}: mesh {name!r} is not there", hint=f"looked for as {file}")
 
 
 def joints_between(root: ElementTree.Element, base: str, tip: str) -> list[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from PIL import Image
+from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.formats.link_poses import link_poses
 from scenewright.stages.kit.formats.urdf_file import parse_urdf
@@ -16,6 +17,7 @@ from scenewright.stages.kit.geometry.transforms import look_at
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.shapes import link_shapes, paint
+from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes
 from scenewright.stages.tableware.simulation.arm import BASE
 from scenewright.stages.tableware.simulation.tabletop import BIN_CENTER, BIN_SIDE
 from scenewright.stages.tableware.table_pictures import captioned
@@ -51,7 +53,7 @@ class PhysicsPictures:
         self._robot = robot
         self._hand = {robot.hand_link, *robot.finger_links}
         self._urdf = parse_urdf(self._robot.urdf)
-        self._links = link_shapes(self._robot.urdf.read_text(encoding="utf-8"), "visual")
+        self._links = _shown(robot)
         self._items = [
             _paint(item_mesh(Item(str(name), kind, (0.0, 0.0, 0.0), measures=Measures(*measures))), COLORS[kind])
             for name, kind, measures in zip(
@@ -81,6 +83,15 @@ class PhysicsPictures:
                 mesh = shape.copy().apply_transform(world)
                 meshes.append(_paint(mesh, HAND_COLOR if link in self._hand else ARM_COLOR))
         return meshes
+
+
+def _shown(robot: RobotDescription) -> dict[str, list[trimesh.Trimesh]]:
+    """Return the shapes of each link: those to see, or to touch where the former are of a format that is not read."""
+    text = with_absolute_meshes(read_urdf(robot.urdf), robot.urdf.parent)
+    try:
+        return link_shapes(text, "visual")
+    except BadInput:
+        return link_shapes(text)
 
 
 def key_frames(labels: Sequence[str], most: int) -> list[int]:

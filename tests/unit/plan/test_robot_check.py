@@ -139,6 +139,12 @@ LINKAGE = '<joint name="second" type="fixed"><parent link="base"/><child link="f
             "own.urdf: mesh 'finger.stl' is not there",
         ),
         ("", UR5.replace('type="prismatic"', 'type="revolute"'), "is revolute, not prismatic"),
+        ('arm_base = "wrist_3"\ntool_link = "base"', UR5, "'base' does not hang from 'wrist_3'"),
+        (
+            "",
+            UR5.replace("</robot>", '<xacro:arm xmlns:xacro="http://www.ros.org/wiki/xacro"/></robot>'),
+            "own.urdf is xacro, not URDF (expand it first",
+        ),
         ("", "<robot", "own.urdf"),
     ],
 )
@@ -164,4 +170,5 @@ def test_a_description_that_says_little_or_names_a_urdf_elsewhere(
         assert run(["robot", "check", str(tmp_path / "below" / "own.toml")]) == 3
         assert "is outside the folder of the description" in capsys.readouterr().err
     assert run(["robot", "check", str(tmp_path / "own.urdf")]) == 2
+    assert "a URDF says too little of a robot" in capsys.readouterr().err
     assert run(["robot", "check", "r2d2"]) == 2
