@@ -27,7 +27,9 @@ def build_application() -> Callable[..., Any]:
     )
     groups: dict[str, typer.Typer] = {}
     two_words = {("urdf", "check"), ("urdf", "settle")}
-    ours = {function.__name__ for function, _ in housekeeping.COMMANDS} | {name for name, *_ in housekeeping.GROUPS}
+    ours = {function.__name__ for function, _ in housekeeping.COMMANDS} | {
+        name for name, *_ in (*housekeeping.GROUPS, *housekeeping.ALONE)
+    }
     for name, stage in all_stages().items():
         if stage.folder.replace("-", "_") in ours:
             logger.warning("%s: its step %r is left out: there is a command %s", package_of(stage), name, stage.folder)
@@ -51,6 +53,11 @@ def build_application() -> Callable[..., Any]:
     for name, alone, below, help_panel in housekeeping.GROUPS:
         group_application = typer.Typer(invoke_without_command=True, rich_markup_mode=None)
         group_application.callback()(alone)
+        for function in below:
+            group_application.command()(function)
+        application.add_typer(group_application, name=name, rich_help_panel=help_panel)
+    for name, says, below, help_panel in housekeeping.ALONE:
+        group_application = typer.Typer(help=f"{says}.", no_args_is_help=True, rich_markup_mode=None)
         for function in below:
             group_application.command()(function)
         application.add_typer(group_application, name=name, rich_help_panel=help_panel)

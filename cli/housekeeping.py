@@ -18,6 +18,7 @@ from scenewright.cli.inspect_command import inspect
 from scenewright.cli.output import out as _out
 from scenewright.cli.output import say as _say
 from scenewright.cli.record_command import record
+from scenewright.cli.robot_check_command import check as check_robot
 from scenewright.cli.serve_command import serve
 from scenewright.cli.show_command import show
 from scenewright.cli.timeline_command import timeline
@@ -317,6 +318,10 @@ GROUPS: tuple[tuple[str, Callable[..., Any], tuple[Callable[..., Any], ...], str
     ("models", models, (serve,), "Installation"),
 )
 """Commands that do something by themselves and have commands below them."""
+ALONE: tuple[tuple[str, str, tuple[Callable[..., Any], ...], str], ...] = (
+    ("robot", "Look at a robot before anything is planned with it", (check_robot,), "Artifacts"),
+)
+"""Groups of commands without steps: what they say of themselves, and the commands."""
 BESIDE_STEPS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("cutting", record),
     ("suture", follow),

@@ -98,6 +98,8 @@ class PackingFile(Model):
     name: str
     """`published/<cell>/<instance>`, `hard/<cell>/<instance>`, or the name of the user's file."""
     proposer: str
+    robot: str = Field("panda", exclude_if=lambda name: name == "panda")
+    """Name of the arm, as its description has it. Absent: the Panda."""
     success: bool
     proposer_calls: int
     """What the thesis calls #LM."""
@@ -109,7 +111,7 @@ class PackingFile(Model):
 
 
 class Packing(Artifact):
-    """`packing.json`, `instance.json`, `plan.txt`, `trajectory.npz` (`joints` (N, 7), `action` (N,) row of the plan),
+    """`packing.json`, `instance.json`, `plan.txt`, `trajectory.npz` (`joints` (N, J), `action` (N,) row of the plan),
     `layout.png` (basket from above), `attempts.png` (plans with the reason at each cut branch), `scene.png` (the end);
     `transcript.jsonl` when a language model was asked."""
 

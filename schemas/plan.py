@@ -128,7 +128,7 @@ class PlanFile(Model):
 
 
 class Plan(Artifact):
-    """`plan.json`, `domain.pddl`, `problem.pddl`, `plan.txt`, `trajectory.npz` (`time` (N,), `joints` (N, 9),
+    """`plan.json`, `domain.pddl`, `problem.pddl`, `plan.txt`, `trajectory.npz` (`time` (N,), `joints` (N, J + 2),
     `world_from_base` (N, 4, 4), `action` (N,)), `keyframes/<k>_<action>.png`, `execution.mcap` (FrameTransforms
     of every body and link, a CompressedImage stream), `graph.json` (the updated contact graph), `graphs/<k>.json` (the
     graph after action k; drives have none)."""

@@ -49,6 +49,8 @@ class TablewareTrialFile(Model):
     policy: str
     """Or `plan` when the actions of a plan were carried out as they stand."""
     simulator: Literal["fast", "physics"]
+    robot: str = Field("", exclude_if=lambda name: name in ("", "ur5_bench"))
+    """Name of the arm in physics, as its description has it. Absent: the UR5 beside its table, or no arm."""
     sight: Literal["truth", "image"]
     """Whether the policy saw everything, or a new rendered image before each action."""
     times: TimesOfActions | None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from scenewright.schemas.evaluation import Evaluation, Report
 from scenewright.schemas.exported_scene import ExportedScene
 from scenewright.schemas.exported_sequence import ExportedSequence
+from scenewright.schemas.exported_trajectory import ExportedTrajectory
 from scenewright.schemas.outside import LARGEST_SHOWN, file_content, file_text
 from scenewright.stages.kit.viewing.canvas import Canvas
 
@@ -40,3 +41,14 @@ def draw_exported_scene(export: ExportedScene, canvas: Canvas) -> None:
     info = export.info
     rows = [f"{info.bodies} bodies, {info.joints} joints as {info.target}: open `{export.path(info.file)}`", ""]
     canvas.document("export", "\n".join([*rows, *(f"- {note}" for note in info.notes)]))
+
+
+def draw_exported_trajectory(export: ExportedTrajectory, canvas: Canvas) -> None:
+    """Say what was written: it is made for controllers."""
+    info = export.info
+    rows = [
+        f"{len(info.motions)} motions of {info.robot}, {info.statement}: open `{export.path('trajectory.csv')}`",
+        "",
+    ]
+    rows += [f"- {motion.start:.1f} s: {motion.name}, {motion.seconds:.1f} s" for motion in info.motions]
+    canvas.document("export", "\n".join(rows))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scenewright.cli.viewing.robot_view import animate_arm, draw_robot
+from scenewright.cli.viewing.robot_view import animate_arm, arm_joints, draw_robot, robot_of
 from scenewright.schemas.outside import LARGEST_SHOWN, file_content
 from scenewright.schemas.packing import (
     BASKET_SLAB,
@@ -57,10 +57,11 @@ def draw_packing(packing: Packing, canvas: Canvas) -> None:
         canvas.boxes("packed", solids, [packed_step.box for packed_step in places], [PACKED_COLOR] * len(places))
         for number, solid in enumerate(solids):
             draw_solid(f"packed/{number}", solid, PACKED_COLOR, canvas)
-    urdf = draw_robot(canvas)
+    robot = robot_of(packing)
+    urdf = draw_robot(canvas, robot)
     if urdf is not None and packing.path("trajectory.npz").is_file():
         (joints,) = read_arrays(packing.path("trajectory.npz"), "joints", hint="make the packing again")
-        animate_arm(canvas, urdf, joints, PERIOD)
+        animate_arm(canvas, urdf, arm_joints(robot), joints, PERIOD)
 
 
 def placed(step: PackingStep, boxes: dict[str, PackingBox]) -> bool:

@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.message import DecodeError
 from scenewright.cli.viewing.inputs import input_artifact
-from scenewright.cli.viewing.robot_view import PANDA, ROBOT, draw_robot
+from scenewright.cli.viewing.robot_view import ROBOT, draw_robot, robot_of
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.interactive_scene import InteractiveScene
@@ -32,7 +32,7 @@ def draw_plan(plan: Plan, canvas: Canvas) -> None:
     if not path.exists():
         return
     with IndexedMcap(path) as log:
-        draw_robot(canvas, str(plan.manifest.parameters.get("robot", PANDA)) if plan.manifest else PANDA)
+        draw_robot(canvas, robot_of(plan))
         _animate(log, canvas)
     for seconds, text, bad in moments(plan):
         canvas.moment(seconds, text, bad=bad)

@@ -31,6 +31,7 @@ from scenewright.stages.agent.session import Session, Turn
 from scenewright.stages.agent.trials import Setting, run_trial
 from scenewright.stages.agent.world.truth import World
 from scenewright.stages.kit.language.failures import LanguageFailed
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 
 class RecordedBrain:
@@ -99,9 +100,10 @@ def write_episode(
     label: str,
     width: int,
     segmenter: str = "",
+    robot: str = USUAL_ROBOT,
 ) -> AgentEpisode:
     """Run a trial and write it down. `language` says, when it is over, what was asked of a model; `segmenter` is what
-    the service that was asked for masks says it is."""
+    the service that was asked for masks says it is, `robot` the name that its description has."""
     watching = Watching()
     session, world = run_trial(setting, arm, brain, one_program=one_program, watch=watching.see)
     scored = score(setting.goals, impossible, session, world)
@@ -117,6 +119,7 @@ def write_episode(
         failures=scales[0],
         perception=scales[1],
         segmenter=segmenter,
+        robot=robot,
         most_turns=setting.limits.turns,
         end=session.end,
         said=session.words,

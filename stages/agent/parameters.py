@@ -13,10 +13,11 @@ from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.stages.kit.language.options import LanguageParameters
 from scenewright.stages.kit.services.address import SEGMENTATION, check_address
+from scenewright.stages.kit.simulation.robot_option import check_robot_acts, robot_files, robot_option
 from scenewright.stages.kit.stage import NOT_SHOWN, External, Optionally, Parameters, Stage
 
 ArmName = Literal["open_loop", "bool_feedback", "thesis", "ours", "oracle"]
-RECIPE, SHAPES, ROBOT = "agent/apartment.toml", "agent/things.toml", "robots/panda.toml"
+RECIPE, SHAPES = "agent/apartment.toml", "agent/things.toml"
 
 
 class EyesParameters(Parameters):
@@ -48,6 +49,7 @@ class RunParameters(LanguageParameters, EyesParameters):
     simulation: Literal["fast", "physics"] = Field(
         "fast", description="Without contact, failures at given rates; or pybullet with rendered cameras (no doors)"
     )
+    robot: str = robot_option("in physics, and one that drives")
     failures: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which executions fail")
     perception: float = Field(1.0, ge=0, le=10, description="Factor of the rates at which the eyes err")
     turns: int = Field(150, ge=1, le=1000, description="Programs at most")
@@ -57,6 +59,7 @@ class RunParameters(LanguageParameters, EyesParameters):
 class ReplayParameters(EyesParameters):
     """Options of `agent replay`."""
 
+    robot: str = robot_option("the one that did the episode")
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the picture [px]")
 
 
@@ -79,6 +82,8 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError("--scene and --truth go together", hint="what the robot knows, and the room it is in")
     if inputs.get("scene") is not None and inputs.get("world") is not None:
         raise UsageError("--world and --scene are two rooms", hint="give one of them")
+    acts = parameters.simulation == "physics"
+    check_robot_acts(parameters, acts=acts, without="the fast world has no arm", hint="give --simulation physics too")
     if parameters.segmenter and parameters.simulation != "physics":
         raise UsageError("--segmenter: nothing takes pictures in the fast world", hint="give --simulation physics too")
     if parameters.segmenter and (parameters.arm == "oracle" or parameters.perception != 1.0):
@@ -106,7 +111,9 @@ RUN = Stage(
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="run_stage",
     versions="segmenter_identity",
-    data_files=lambda parameters: (RECIPE, SHAPES, ROBOT) if parameters.simulation == "physics" else (RECIPE,),
+    data_files=lambda parameters: (
+        (RECIPE, SHAPES, *robot_files(parameters.robot)) if parameters.simulation == "physics" else (RECIPE,)
+    ),
     check=check_run,
     example='scenewright agent run --task "Put all the fruit onto the plate." --seed 3 --out outputs/agent/episode',
 )
@@ -119,7 +126,7 @@ REPLAY = Stage(
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="replay_stage",
     versions="segmenter_identity",
-    data_files=lambda parameters: (RECIPE, SHAPES, ROBOT),
+    data_files=lambda parameters: (RECIPE, SHAPES, *robot_files(parameters.robot)),
     example="scenewright agent replay --episode outputs/agent/episode --out outputs/agent/again",
 )
 EVALUATE = Stage(

@@ -16,6 +16,7 @@ from scenewright.stages.agent.session import Limits
 from scenewright.stages.agent.tasks import TASKS
 from scenewright.stages.agent.trials import Setting, goals_of
 from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.stage import Context
 
 
@@ -30,6 +31,12 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
             f"{episode.root}: seen by {file.segmenter or 'the oracle with errors'}, not by {identity or 'it'}",
             hint="give --segmenter with the address of that service" if file.segmenter else "leave --segmenter out",
         )
+    name = load_robot(parameters.robot).name
+    if name != file.robot:
+        raise BadInput(
+            f"{episode.root}: done by the robot {file.robot}, not by {name}",
+            hint=f"give --robot {file.robot}, or its description",
+        )
     task = TASKS.get(file.task)
     setting = Setting(
         episode.apartment,
@@ -41,6 +48,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         world=file.simulation,
         known=Apartment.read(episode.path("known.json")) if episode.path("known.json").is_file() else None,
         segmenter=parameters.segmenter,
+        robot=parameters.robot,
     )
     replayed = write_episode(
         context.output,
@@ -55,6 +63,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         label=file.brain,
         width=parameters.image_width,
         segmenter=identity,
+        robot=name,
     )
     if episode.path("transcript.jsonl").is_file():
         shutil.copyfile(episode.path("transcript.jsonl"), context.output / "transcript.jsonl")

@@ -23,6 +23,8 @@ from scenewright.stages.agent.world.reconstructed import apartment_of
 from scenewright.stages.kit.language.chat import Chat
 from scenewright.stages.kit.language.opening import open_chat
 from scenewright.stages.kit.language.scripted import ScriptedBackend
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 from scenewright.stages.kit.stage import Context
 
 
@@ -58,6 +60,7 @@ def run(
         world=parameters.simulation,
         known=known_apartment,
         segmenter=parameters.segmenter,
+        robot=parameters.robot,
     )
     chat = _chat(parameters, transcript, context) if parameters.brain == "language" else None
     brain: Brain = LanguageBrain(words, chat) if chat is not None else rules_brain(setting, parameters.arm)
@@ -77,6 +80,7 @@ def run(
             label=brain.label,
             width=parameters.image_width,
             segmenter=identity_of(parameters.segmenter),
+            robot=load_robot(parameters.robot).name if parameters.simulation == "physics" else USUAL_ROBOT,
         )
 
 

@@ -22,6 +22,7 @@ from scenewright.stages.agent.world.floor import Floor
 from scenewright.stages.agent.world.reconstructed import mapped
 from scenewright.stages.agent.world.truth import World
 from scenewright.stages.kit.rendering.segmenter_errors import Luck
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 WorldName = Literal["fast", "physics"]
 
@@ -44,6 +45,8 @@ class Setting:
     """What was mapped of it before the robot came, as far as it is right."""
     segmenter: str = ""
     """Address of the segmentation service that the eyes ask in physics; empty: the oracle with errors."""
+    robot: str = USUAL_ROBOT
+    """Of data/robots/, or the path of a description; only in physics."""
 
 
 def goals_of(words: str) -> tuple[Goal, ...]:
@@ -68,7 +71,7 @@ def open_world(setting: Setting, arm: str) -> World:
             from scenewright.stages.agent.world.physics.asked import AskedSegmenter
 
             segmenter = AskedSegmenter(setting.segmenter, setting.seed)
-        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed, segmenter)
+        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed, segmenter, setting.robot)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 
 

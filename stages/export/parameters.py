@@ -1,4 +1,4 @@
-"""Declarations of `export` and `export scene`."""
+"""Declarations of `export`, `export scene` and `export plan`."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from pydantic import Field
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.exported_scene import ExportedScene
 from scenewright.schemas.exported_sequence import ExportedSequence
+from scenewright.schemas.exported_trajectory import ExportedTrajectory
 from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.plan import Plan
 from scenewright.schemas.segments import Segments
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.export.registry import STREAMS, all_formats, dialects, layouts
 from scenewright.stages.export.scene_registry import scene_formats
 from scenewright.stages.kit.estimates import Estimate, Inputs, grows_with
+from scenewright.stages.kit.simulation.robot_option import robot_files, robot_option
 from scenewright.stages.kit.stage import Optionally, Parameters, Stage
 
 if TYPE_CHECKING:
@@ -82,6 +85,12 @@ class SceneExportParameters(Parameters):
     )
 
 
+class PlanExportParameters(Parameters):
+    """Options of `export plan`."""
+
+    robot: str = robot_option("the one that the plan is for")
+
+
 EXPORT = Stage(
     name="export",
     summary="Write a sequence back as TUM RGB-D, nerfstudio or MCAP, or with its masks as COCO, for other tools",
@@ -108,4 +117,16 @@ EXPORT_SCENE = Stage(
     estimate=grows_with("scene", 0.0, 1.5, 130, 1.0),
 )
 
-STAGES = (EXPORT, EXPORT_SCENE)
+EXPORT_PLAN = Stage(
+    name="export plan",
+    summary="Write a plan's motions as ROS 2 joint trajectories (YAML, MCAP) and CSV; not run on hardware",
+    parameters=PlanExportParameters,
+    reads={"plan": Plan},
+    writes=ExportedTrajectory,
+    module="plan_stage",
+    libraries=("numpy", "mcap", "zstandard", "rosbags"),
+    data_files=lambda parameters: robot_files(parameters.robot),
+    example="scenewright export plan --plan outputs/demo/plan --out outputs/demo/trajectory",
+)
+
+STAGES = (EXPORT, EXPORT_SCENE, EXPORT_PLAN)

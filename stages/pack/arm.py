@@ -17,6 +17,7 @@ from scenewright.stages.kit.motion.compiled_check import link_frames
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 Limits = Literal["fr3", "panda"]
 FR3_LOWER = np.array([-5.3093, -1.5133, -2.4937, -2.7478, -2.48, 0.8521, -5.7995])
@@ -51,6 +52,10 @@ class ToolPose:
         return np.array([[c, s, 0, self.x], [s, -c, 0, self.y], [0, 0, -1, self.z], [0, 0, 0, 1.0]])
 
 
+HOME_POSE = ToolPose(0.306891, 0.0, 0.485302, 0.0)
+"""Pose of the tool at the home configuration."""
+
+
 @dataclass(frozen=True)
 class _Lengths:
     """The measures of the planar arm [m], out of the chain."""
@@ -71,11 +76,14 @@ class _Lengths:
 class FixedArm:
     """Inverse kinematics of downward tool poses of the arm at the origin."""
 
-    def __init__(self, limits: Limits = "fr3", robot: str = "panda") -> None:
+    closed = True
+    home, home_pose = HOME, HOME_POSE
+
+    def __init__(self, limits: Limits = "fr3", robot: str = USUAL_ROBOT) -> None:
         description = load_robot(robot)
         if limits == "fr3":
             description = replace(description, lower=FR3_LOWER, upper=FR3_UPPER)
-        self.limits = limits
+        self.limits, self.robot = limits, robot
         self.description: RobotDescription = description
         self.chain: ArmChain = arm_chain(description)
         self._lengths = _measures(self.chain)
@@ -188,7 +196,7 @@ class FixedArm:
         return self._numeric[key]
 
 
-def panda_lengths(chain: ArmChain) -> np.ndarray | None:
+def planar_lengths(chain: ArmChain) -> np.ndarray | None:
     """Return shoulder height, upper arm, elbow offset, forearm, wrist offset (5,) [m]; None for another build."""
     if len(chain.fixed) != 7:
         return None
@@ -205,7 +213,7 @@ def panda_lengths(chain: ArmChain) -> np.ndarray | None:
 
 def _measures(chain: ArmChain) -> _Lengths:
     """Read the planar arm's measures out of the chain; raises ValueError when it is no arm of this shape."""
-    lengths = panda_lengths(chain)
+    lengths = planar_lengths(chain)
     if lengths is None or lengths[1:].min() <= 0:
         raise ValueError("not an arm of the Franka's shape")
     shoulder, upper, elbow, forearm, wrist = lengths.tolist()

@@ -9,9 +9,8 @@ from scenewright.stages.kit.simulation.engine import engine, native_output_to_st
 from scenewright.stages.pack.arm import FixedArm
 from scenewright.stages.pack.hand import Named
 from scenewright.stages.pack.solids import Block
+from scenewright.stages.pack.solved_arm import SolvedArm
 
-FINGER_OPENING = 0.04
-"""Each finger from the middle [m]."""
 TOUCH = 1e-4
 """Penetration that counts as touching [m]: what is held may slide along what it stands beside."""
 
@@ -19,7 +18,7 @@ TOUCH = 1e-4
 class ArmScene:
     """The arm, the table and blocks. Blocks stand; one of them may be held. Close it after use."""
 
-    def __init__(self, arm: FixedArm) -> None:
+    def __init__(self, arm: FixedArm | SolvedArm) -> None:
         self.client = engine.connect(engine.DIRECT)
         description = arm.description
         with native_output_to_stderr():
@@ -37,13 +36,14 @@ class ArmScene:
             self._links[index] = info[12].decode()
         self._joints = [names[name] for name in description.arm_joints]
         for name in description.finger_joints:
-            engine.resetJointState(self._robot, names[name], FINGER_OPENING, physicsClientId=self.client)
+            engine.resetJointState(self._robot, names[name], description.opening / 2, physicsClientId=self.client)
         self._choose_self_collisions(names, description.arm_joints)
         self._bodies: list[tuple[int, str]] = []
         self._held: tuple[int, np.ndarray] | None = None
         self._tool = next(index for index, name in self._links.items() if name == description.tool_link)
         self._table = self._box((1.5, 1.5, 0.005), (0.0, 0.0, TABLE_TOP - 0.005), 0.0)
-        engine.setCollisionFilterPair(self._robot, self._table, -1, -1, 0, physicsClientId=self.client)
+        for link in (-1, self._joints[0]):  # what turns about the vertical in its place
+            engine.setCollisionFilterPair(self._robot, self._table, link, -1, 0, physicsClientId=self.client)
 
     def close(self) -> None:
         """Disconnect; the scene cannot be used afterwards."""
@@ -55,8 +55,9 @@ class ArmScene:
         rank = {index: rank_of_link for rank_of_link, index in enumerate(order)}
         for first in self._links:
             for second in self._links:
-                a, b = rank.get(first, 7), rank.get(second, 7)
-                if first < second and (abs(a - b) <= 2 or min(a, b) >= 5):
+                last = len(arm_joints)
+                a, b = rank.get(first, last), rank.get(second, last)
+                if first < second and (abs(a - b) <= 2 or min(a, b) >= last - 2):
                     engine.setCollisionFilterPair(
                         self._robot, self._robot, first, second, 0, physicsClientId=self.client
                     )
@@ -89,7 +90,7 @@ class ArmScene:
             self._held = (body, np.array([0.0, 0.0, above]))
 
     def check(self, arm: np.ndarray) -> Collision | None:
-        """Return the worst collision of joint values (7,), None when they are free."""
+        """Return the worst collision of joint values (J,), None when they are free."""
         client = self.client
         for index, value in zip(self._joints, arm.tolist(), strict=True):
             engine.resetJointState(self._robot, index, value, physicsClientId=client)

@@ -15,7 +15,7 @@ from scenewright.schemas.plan import Failure
 from scenewright.stages.pack.arm import Limits, ToolPose
 from scenewright.stages.pack.hand import Named, place_tool_pose, release_height, tool_over_centre
 from scenewright.stages.pack.instances import Instance
-from scenewright.stages.pack.motion import HOME_STANCE, Motion, MotionPlanner, Stance
+from scenewright.stages.pack.motion import Motion, MotionPlanner, Stance
 from scenewright.stages.pack.records import Action, BoxState
 from scenewright.stages.pack.settling import Rest, SettlingTable, rest_of
 from scenewright.stages.pack.solids import Block, block_over, flat_depth
@@ -55,7 +55,7 @@ class PackingWorld:
         self._fixed = tuple(Named(obstacle.rectangle.name, obstacle.block) for obstacle in instance.obstacles)
         self._seen: dict[tuple[str, Rest], BoxState] = {}
         self._blocks: dict[tuple[str, Rest], Named] = {}
-        self.initial = State({box.name: rest_of(box, TABLE_TOP) for box in instance.boxes}, HOME_STANCE)
+        self.initial = State({box.name: rest_of(box, TABLE_TOP) for box in instance.boxes}, self.planner.home)
 
     def __enter__(self) -> PackingWorld:
         return self
@@ -120,7 +120,7 @@ class PackingWorld:
                 x, y, yaw = clipped(action)
                 bottom = release_height(box.height) - box.height / 2
                 rests = self._table.settle(rests | {box.name: rest_of(replace(box, x=x, y=y, yaw=yaw), bottom)})
-        return self.outside(State(rests, HOME_STANCE))
+        return self.outside(State(rests, self.planner.home))
 
     def _even_ground(self, box: BoxState) -> float | None:
         """Return the height [m] of the surface under all of a box that is let go; None when it is not one surface.

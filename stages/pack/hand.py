@@ -1,4 +1,4 @@
-"""The hand and what it holds as upright blocks: conservative boxes around the meshes of the Panda's hand."""
+"""The hand and what it holds as upright blocks, where they are at a tool pose, and what they hit there."""
 
 from __future__ import annotations
 
@@ -6,18 +6,10 @@ from dataclasses import dataclass
 
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.pack.arm import ToolPose
+from scenewright.stages.pack.hand_shape import PUBLISHED, HandShape
 from scenewright.stages.pack.records import BoxState
 from scenewright.stages.pack.solids import Block, overlap
 
-# Measured on the collision meshes with the fingers 8 cm apart; heights from the tool point, metres.
-PALM = (0.032, 0.104, 0.038, 0.133)
-"""Half width, half length, lowest and highest point of the palm [m]."""
-FINGER = (0.011, 0.014, -0.008, 0.047)
-"""Half width, half length, lowest and highest point of a finger [m]."""
-FINGER_OFFSET = 0.053
-"""Distance of a finger's middle from the hand's [m]."""
-TIP_BELOW_TOOL = 0.008
-"""Height of the tool point over the fingertips [m]."""
 TOOL_OVER_TOP = 0.015
 """The tool stays this far over the upper face of the box it takes [m]; 5 cm over the centre of a box of 7 cm."""
 TOOL_OVER_CENTRE = 0.05
@@ -51,14 +43,15 @@ def place_tool_pose(box: BoxState, x: float, y: float, yaw: float) -> ToolPose:
     return ToolPose(x, y, release_height(box.height) + tool_over_centre(box.height), yaw)
 
 
-def hand_blocks(pose: ToolPose) -> tuple[Block, ...]:
+def hand_blocks(pose: ToolPose, hand: HandShape = PUBLISHED) -> tuple[Block, ...]:
     """Return palm and both fingers at a tool pose; the fingers lie along the tool's y axis."""
-    half_x, half_y, low, high = PALM
+    half_x, half_y, low, high = hand.palm
+    half_width, half_length, tip, top = hand.finger
     palm = Block(pose.x, pose.y, pose.yaw, half_x, half_y, pose.z + low, pose.z + high)
     fingers = []
     for side in (-1, 1):
-        x, y = palm.moved(0.0, side * FINGER_OFFSET)
-        fingers.append(Block(x, y, pose.yaw, FINGER[0], FINGER[1], pose.z + FINGER[2], pose.z + FINGER[3]))
+        x, y = palm.moved(0.0, side * hand.finger_offset)
+        fingers.append(Block(x, y, pose.yaw, half_width, half_length, pose.z + tip, pose.z + top))
     return (palm, *fingers)
 
 
@@ -68,14 +61,16 @@ def held_block(pose: ToolPose, width: float, length: float, height: float) -> Bl
     return Block(pose.x, pose.y, pose.yaw, width / 2, length / 2, centre - height / 2, centre + height / 2)
 
 
-def end_collision(pose: ToolPose, held: Named | None, others: tuple[Named, ...]) -> MotionFailed | None:
+def end_collision(
+    pose: ToolPose, held: Named | None, others: tuple[Named, ...], hand: HandShape = PUBLISHED
+) -> MotionFailed | None:
     """Return the deepest collision of the held box (at its block), palm and fingers at a pose, None when it is free.
 
     `goal_in_collision`: objects what is hit and what hits it (`hand` or the held box), numbers depth [m].
     """
     worst: tuple[float, str, str] | None = None
     carried_blocks = [(held.name, held.block)] if held is not None else []
-    carried_blocks += [("hand", block) for block in hand_blocks(pose)]
+    carried_blocks += [("hand", block) for block in hand_blocks(pose, hand)]
     for part, block in carried_blocks:
         for obstacle in others:
             depth = overlap(block, obstacle.block)

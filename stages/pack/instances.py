@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.pack.hand_shape import PUBLISHED, HandShape
 from scenewright.stages.pack.records import Action, BoxState, Observation, Rectangle
 from scenewright.stages.pack.solids import Block, block_over
 
@@ -32,11 +33,14 @@ class Instance:
     basket: Rectangle
     obstacles: tuple[Obstacle, ...] = ()
     certificate: tuple[Action, ...] = ()
+    hand: HandShape = PUBLISHED
+    """That packs them."""
 
     @property
     def observation(self) -> Observation:
         """What a proposer sees: everything but the heights of obstacles and the robot's reach."""
-        return Observation(self.boxes, self.basket, tuple(obstacle.rectangle for obstacle in self.obstacles))
+        rectangles = tuple(obstacle.rectangle for obstacle in self.obstacles)
+        return Observation(self.boxes, self.basket, rectangles, self.hand)
 
     @property
     def fill(self) -> float:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from math import hypot, inf
 
 from scenewright.stages.pack.hand import hand_blocks, place_tool_pose
+from scenewright.stages.pack.hand_shape import HandShape
 from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation, Rectangle
 from scenewright.stages.pack.solids import block_over, flat_depth
 
@@ -43,7 +44,6 @@ def learn(observation: Observation, trace: Sequence[Attempt], reasons: bool) -> 
     """Return what all failures of the trace say; without reasons, that a placement or a pick did not work."""
     limits = LearnedLimits()
     boxes = {box.name: box for box in observation.boxes}
-    obstacles = {obstacle.name: obstacle for obstacle in observation.obstacles}
     for attempt in trace:
         limits.culprit = None
         failed = attempt.feedback[-1] if attempt.feedback else None
@@ -55,7 +55,7 @@ def learn(observation: Observation, trace: Sequence[Attempt], reasons: bool) -> 
                 numbers = failed.failure.numbers
                 limits.reach = min(limits.reach, hypot(numbers["nearest_x"], numbers["nearest_y"]) - REACH_MARGIN)
             elif kind == "goal_in_collision":
-                _collision(limits, action, failed.failure.objects, failed.failure.numbers["depth"], boxes, obstacles)
+                _collision(limits, action, failed.failure.objects, failed.failure.numbers["depth"], observation)
         if attempt.task is not None and attempt.actions:
             limits.inward += 0.004
             for action in attempt.actions:
@@ -84,13 +84,10 @@ def _refuse(
 
 
 def _collision(
-    limits: LearnedLimits,
-    action: Action,
-    objects: tuple[str, ...],
-    depth: float,
-    boxes: dict[str, BoxState],
-    obstacles: dict[str, Rectangle],
+    limits: LearnedLimits, action: Action, objects: tuple[str, ...], depth: float, observation: Observation
 ) -> None:
+    boxes = {box.name: box for box in observation.boxes}
+    obstacles = {obstacle.name: obstacle for obstacle in observation.obstacles}
     offender = objects[0]
     by_hand = "hand" in objects[1:]
     if action.name == "pick":
@@ -98,7 +95,7 @@ def _collision(
             limits.before.add((offender, action.box))
         return
     if by_hand and offender in obstacles:
-        bottom = _lowest_part_over(boxes[action.box], action, obstacles[offender])
+        bottom = _lowest_part_over(boxes[action.box], action, obstacles[offender], observation.hand)
         if bottom is not None and bottom + 1e-6 > limits.tops.get(offender, 0.0):
             limits.tops[offender] = bottom + 1e-6
             return
@@ -108,9 +105,9 @@ def _collision(
     limits.culprit = offender if offender in boxes else None
 
 
-def _lowest_part_over(box: BoxState, action: Action, obstacle: Rectangle) -> float | None:
+def _lowest_part_over(box: BoxState, action: Action, obstacle: Rectangle, hand: HandShape) -> float | None:
     """Return the lowest bottom [m] of the parts of the hand over an obstacle: it is higher than that."""
     under = block_over(obstacle.low, obstacle.high, 0.0, 0.0)
     pose = place_tool_pose(box, action.x or 0.0, action.y or 0.0, action.yaw or 0.0)
-    bottoms = [part.bottom for part in hand_blocks(pose) if flat_depth(part, under) > 0]
+    bottoms = [part.bottom for part in hand_blocks(pose, hand) if flat_depth(part, under) > 0]
     return min(bottoms, default=None)

@@ -25,19 +25,21 @@ HEIGHTS = np.arange(0.04, 0.56, STEP)
 """Heights of the tool [m]."""
 BASE_RADIUS = 0.27
 """Links 0 to 2 stay within this distance of the axis, up to the shoulder [m]; link 3 begins there."""
-LINKS = tuple(f"panda_link{number}" for number in range(3, 8))
-"""Links whose lowest point is kept."""
 
 
 @cache
 def _hulls(robot: str) -> tuple[np.ndarray, ...]:
     description = FixedArm("fr3", robot).description
     root = read_urdf(description.urdf)
-    keep = [link for link in root.findall("link") if link.get("name") in LINKS]
+    children = {
+        joint.get("name"): child.get("link") for joint in root.findall("joint") for child in joint.findall("child")
+    }
+    names = [str(children[joint]) for joint in description.arm_joints[2:]]
+    keep = [link for link in root.findall("link") if link.get("name") in names]
     kept_robot = ElementTree.Element("robot", {"name": "links"})
     kept_robot.extend(keep)
     shapes = link_shapes(without_visuals(with_absolute_meshes(kept_robot, description.urdf.parent)))
-    return tuple(np.concatenate([mesh.convex_hull.vertices for mesh in shapes[name]]) for name in LINKS)
+    return tuple(np.concatenate([mesh.convex_hull.vertices for mesh in shapes[name]]) for name in names)
 
 
 @cache
@@ -67,7 +69,7 @@ def lowest_within(arm: FixedArm, radii: tuple[float, float], heights: tuple[floa
 
     -inf when the range leaves the table or holds a position that the planar arm cannot take.
     """
-    table = lowest_points(arm.description.name, arm.limits)
+    table = lowest_points(arm.robot, arm.limits)
     rows = (radii[0] - RADII[0]) / STEP, (radii[1] - RADII[0]) / STEP
     columns = (heights[0] - HEIGHTS[0]) / STEP, (heights[1] - HEIGHTS[0]) / STEP
     if rows[0] < 0 or columns[0] < 0 or rows[1] > len(RADII) - 1 or columns[1] > len(HEIGHTS) - 1:
@@ -77,7 +79,7 @@ def lowest_within(arm: FixedArm, radii: tuple[float, float], heights: tuple[floa
 
 def lowest_on_path(arm: FixedArm, radii: np.ndarray, heights: np.ndarray) -> float:
     """Return a lower bound [m] of the links' height along tool positions (N,), (N,); -inf when one is off the table."""
-    table = lowest_points(arm.description.name, arm.limits)
+    table = lowest_points(arm.robot, arm.limits)
     row = (radii - RADII[0]) / STEP
     column = (heights - HEIGHTS[0]) / STEP
     if row.min() < 0 or column.min() < 0 or row.max() >= len(RADII) - 1 or column.max() >= len(HEIGHTS) - 1:

@@ -13,13 +13,18 @@ from functools import partial
 from math import atan2, ceil, cos, hypot, pi, sin
 
 import numpy as np
+from scenewright.stages.kit.motion.kinematics import arm_chain
 from scenewright.stages.kit.motion.rrt_connect import SearchSpace, densify, first_collision, rrt_connect
-from scenewright.stages.pack.arm import HOME, FixedArm, Limits, ToolPose, planar_joints
+from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
+from scenewright.stages.pack.arm import HOME, HOME_POSE, FixedArm, Limits, ToolPose, planar_joints, planar_lengths
 from scenewright.stages.pack.arm_scene import ArmScene
-from scenewright.stages.pack.hand import TIP_BELOW_TOOL, Named, end_collision, hand_blocks, held_block, tool_over_centre
+from scenewright.stages.pack.hand import Named, end_collision, hand_blocks, held_block, tool_over_centre
+from scenewright.stages.pack.hand_shape import PUBLISHED, HandShape, measured
 from scenewright.stages.pack.link_heights import BASE_RADIUS, lowest_on_path, lowest_within
 from scenewright.stages.pack.records import BoxState
 from scenewright.stages.pack.solids import overlap
+from scenewright.stages.pack.solved_arm import SolvedArm, way_between
 
 OVER = 0.015
 """What is carried over something passes this far above it [m]."""
@@ -29,8 +34,6 @@ RESOLUTION = 0.05
 """Largest step of a joint between two mesh checks [rad]."""
 SAMPLES = 60
 """Samples of one search, as many as the published planner draws in its three tries."""
-HOME_POSE = ToolPose(0.306891, 0.0, 0.485302, 0.0)
-"""Pose of the tool at the home configuration."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ HOME_STANCE = Stance(HOME, HOME_POSE)
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion that is free: what makes its joint values (N, 7) of straight pieces, and where it ends."""
+    """A motion that is free: what makes its joint values (N, J) of straight pieces, and where it ends."""
 
     make: Callable[[], np.ndarray]
     end: Stance
@@ -62,8 +65,10 @@ class Motion:
 class MotionPlanner:
     """Plans motions of the arm among upright blocks. Holds a pybullet client once one was needed; close it."""
 
-    def __init__(self, limits: Limits = "fr3", seed: int = 0) -> None:
-        self.arm = FixedArm(limits)
+    def __init__(self, limits: Limits = "fr3", seed: int = 0, robot: str = USUAL_ROBOT) -> None:
+        self.arm = open_arm(limits, robot)
+        self.hand = PUBLISHED if robot == USUAL_ROBOT else measured(self.arm.description)
+        self.home = Stance(self.arm.home, self.arm.home_pose)
         self._scene: ArmScene | None = None
         self._seed = seed
         self.mesh_calls = 0
@@ -83,11 +88,14 @@ class MotionPlanner:
         arm = self.arm.solve(goal, start.arm)
         end = Stance(arm, goal)
         carried = None if held is None else Named(held.name, held_block(goal, held.width, held.length, held.height))
-        failure = end_collision(goal, carried, others)
+        failure = end_collision(goal, carried, others, self.hand)
         if failure is not None:
             raise failure
         tops = max((obstacle.block.top for obstacle in others), default=0.0)
-        height = _height_over(start, end, held, tops)
+        height = _height_over(start, end, held, tops, self.hand)
+        if isinstance(self.arm, SolvedArm):
+            way = _up_over_down(self.arm, start, goal, height)
+            return self._with_meshes(start, end if way is None else Stance(way[-1], goal), held, others, way)
         if self._surely_free(start, end, height, tops, others):
             return Motion(lambda: _require_path(self._over(start, end, height, held, tops, others))[0], end, False)
         path = self._over(start, end, height, held, tops, others)
@@ -105,7 +113,7 @@ class MotionPlanner:
         """
         radii = sorted((start.pose.radius, end.pose.radius))
         heights = min(start.pose.z, end.pose.z), height
-        lowest = lowest_within(self.arm, (radii[0], radii[1]), heights)
+        lowest = lowest_within(_closed(self.arm), (radii[0], radii[1]), heights)
         return lowest > tops and not _near_base(others)
 
     def _over(
@@ -115,7 +123,7 @@ class MotionPlanner:
         rise, fall = self._lift(start, height), self._lift(end, height)
         across = _arc(rise[-1], fall[-1])
         points = np.concatenate([rise, across, fall[::-1]])
-        joints = planar_joints(self.arm, points[:, 0], points[:, 2])
+        joints = planar_joints(_closed(self.arm), points[:, 0], points[:, 2])
         if joints is None:
             return None
         joints[:, 0] += points[:, 1]
@@ -129,7 +137,7 @@ class MotionPlanner:
             return None
         if np.abs(joints[0] - start.arm).max() > 0.02 or np.abs(joints[-1] - end.arm).max() > 0.02:
             return None
-        free = not _near_base(others) and lowest_on_path(self.arm, points[:, 0], points[:, 2]) > tops
+        free = not _near_base(others) and lowest_on_path(_closed(self.arm), points[:, 0], points[:, 2]) > tops
         free = free and all(
             self._is_free_drawn_in(stance, line, held, others) for stance, line in ((start, rise), (end, fall))
         )
@@ -142,7 +150,7 @@ class MotionPlanner:
         azimuth += 2 * pi * round((stance.arm[0] - azimuth) / (2 * pi))  # joint 1 may have gone past the half turn
         count = max(1, ceil((height - pose.z) / STRIDE))
         heights = np.linspace(pose.z, height, count + 1)
-        radii = np.minimum(pose.radius, self.arm.reaches(heights) - 1e-6)
+        radii = np.minimum(pose.radius, _closed(self.arm).reaches(heights) - 1e-6)
         return np.column_stack([radii, np.full(count + 1, azimuth), heights])
 
     def _is_free_drawn_in(
@@ -154,7 +162,7 @@ class MotionPlanner:
             return True
         for radius, azimuth, height in rise.tolist():
             at = ToolPose(radius * cos(azimuth), radius * sin(azimuth), height, pose.yaw)
-            blocks = list(hand_blocks(at))
+            blocks = list(hand_blocks(at, self.hand))
             if held is not None:
                 blocks.append(held_block(at, held.width, held.length, held.height))
             if any(overlap(block, obstacle.block) > 0 for block in blocks for obstacle in others):
@@ -175,7 +183,7 @@ class MotionPlanner:
             block = held_block(end.pose, held.width, held.length, held.height)
             grasp = (held.name, block, tool_over_centre(held.height))
         scene.arrange(others, grasp)
-        resolution = np.full(7, RESOLUTION)
+        resolution = np.full(len(start.arm), RESOLUTION)
         for candidate in (path, np.array([start.arm, end.arm])):
             if candidate is None:
                 continue
@@ -197,9 +205,39 @@ class MotionPlanner:
         return Motion(lambda: planned, end, True)
 
 
-def _height_over(start: Stance, end: Stance, held: BoxState | None, tops: float) -> float:
+def open_arm(limits: Limits, robot: str) -> FixedArm | SolvedArm:
+    """Return the kinematics of a robot: closed forms for one of the Franka's build, else a search. Raises as
+    `load_robot` does, and BadInput for an arm that is too short for the scene."""
+    if robot == USUAL_ROBOT:
+        return FixedArm(limits)
+    description = load_robot(robot)
+    return FixedArm("panda", robot) if planar_lengths(arm_chain(description)) is not None else SolvedArm(description)
+
+
+def _closed(arm: FixedArm | SolvedArm) -> FixedArm:
+    assert isinstance(arm, FixedArm)
+    return arm
+
+
+def _up_over_down(arm: SolvedArm, start: Stance, goal: ToolPose, height: float) -> np.ndarray | None:
+    """Return joint values (N, J) of the way up, over and down to a tool pose; drawn in where the arm does not get as
+    high so far out, None where it cannot follow."""
+    over = [
+        ToolPose(pose.x * share, pose.y * share, height, pose.yaw)
+        for pose in (start.pose, goal)
+        for share in [min(1.0, max(arm.reach(height) - 1e-3, 0.0) / max(pose.radius, 1e-6))]
+    ]
+    poses: list[ToolPose] = []
+    before = start.pose
+    for corner in (*over, goal):
+        poses += way_between(before, corner)
+        before = corner
+    return arm.follow(poses, start.arm)
+
+
+def _height_over(start: Stance, end: Stance, held: BoxState | None, tops: float, hand: HandShape) -> float:
     """Return the height [m] of the tool at which hand and held box pass over all that stands."""
-    under = TIP_BELOW_TOOL if held is None else tool_over_centre(held.height) + held.height / 2
+    under = hand.tip_below if held is None else tool_over_centre(held.height) + held.height / 2
     return max(tops + OVER + under, start.pose.z, end.pose.z)
 
 
@@ -225,9 +263,9 @@ def _arc(first: np.ndarray, last: np.ndarray) -> np.ndarray:
 
 
 def _narrow(space: SearchSpace, whole_range: np.ndarray) -> SearchSpace:
-    """Keep joints 1 and 7, which could go round more than once, near where the motion needs them."""
+    """Keep the first and the last joint, which could go round more than once, near where the motion needs them."""
     lower, upper = space.lower.copy(), space.upper.copy()
-    for joint in (0, 6):
+    for joint in (0, -1):
         lower[joint] = max(lower[joint], whole_range[:, joint].min() - 1.0)
         upper[joint] = min(upper[joint], whole_range[:, joint].max() + 1.0)
     return SearchSpace(lower, upper, space.resolution)

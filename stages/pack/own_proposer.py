@@ -15,6 +15,7 @@ import numpy as np
 from scenewright.schemas.packing import BASKET_TOP
 from scenewright.schemas.plan import Failure
 from scenewright.stages.pack.hand import hand_blocks, place_tool_pose
+from scenewright.stages.pack.hand_shape import HandShape
 from scenewright.stages.pack.layout_search import LayoutProblem, find_layout
 from scenewright.stages.pack.learned_limits import LearnedLimits, learn
 from scenewright.stages.pack.records import Action, Attempt, BoxState, Observation
@@ -160,7 +161,7 @@ def _problem(
     observation: Observation, boxes: list[BoxState], limits: LearnedLimits, held: tuple[Spot, ...], out: float
 ) -> LayoutProblem:
     """Return the arrays of the search; boxes are in the order of execution."""
-    hand, bottoms = _hand_footprints(boxes)
+    hand, bottoms = _hand_footprints(boxes, observation.hand)
     fixed = np.array([[*o.low, *o.high] for o in observation.obstacles]).reshape(-1, 4)
     tops = np.array([limits.tops.get(o.name, 0.0) for o in observation.obstacles])
     heights = np.array([BASKET_TOP + box.height for box in boxes])
@@ -185,10 +186,15 @@ def _problem(
     )
 
 
-def _hand_footprints(boxes: list[BoxState]) -> tuple[np.ndarray, np.ndarray]:
+def _hand_footprints(boxes: list[BoxState], shape: HandShape) -> tuple[np.ndarray, np.ndarray]:
     """Return (2, K, 4) footprints about the tool at both turns, and (B, K) the world z of their bottoms [m]."""
     footprints = np.array(
-        [[part.bounds for part in hand_blocks(place_tool_pose(boxes[0], 0.0, 0.0, turn * QUARTER))] for turn in (0, 1)]
+        [
+            [part.bounds for part in hand_blocks(place_tool_pose(boxes[0], 0.0, 0.0, turn * QUARTER), shape)]
+            for turn in (0, 1)
+        ]
     )
-    bottoms = np.array([[part.bottom for part in hand_blocks(place_tool_pose(box, 0.0, 0.0, 0.0))] for box in boxes])
+    bottoms = np.array(
+        [[part.bottom for part in hand_blocks(place_tool_pose(box, 0.0, 0.0, 0.0), shape)] for box in boxes]
+    )
     return footprints, bottoms

@@ -9,6 +9,7 @@ from pydantic import Field
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.packing import Packing
 from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT, robot_files, robot_option
 from scenewright.stages.kit.stage import External, Optionally, Stage
 
 Suite = Literal[
@@ -54,14 +55,20 @@ class PackParameters(LanguageParameters):
     trace_length: int = Field(5, ge=1, le=100, description="Attempts that a language model is shown (k)")
     iterations: int = Field(20, ge=1, le=1_000_000, description="Plans proposed at most")
     motion_calls: int = Field(20_000, ge=1, le=10_000_000, description="Motion-planner calls at most")
+    robot: str = robot_option("it is bolted down at the origin")
     limits: Literal["fr3", "panda"] = Field(
-        "fr3", description="Joint limits: as published for LLM3, or the Panda's own"
+        "fr3", description="Joint limits of the Panda: as published for LLM3, or its own; other robots have their own"
     )
     image_width: int = Field(900, ge=200, le=4000, description="Width of the pictures [px]")
 
 
 def check_inputs(parameters: PackParameters, inputs: Mapping[str, Any]) -> None:
-    """Raise UsageError when a transcript is given that nobody reads."""
+    """Raise UsageError when a transcript is given that nobody reads, and for limits of another robot."""
+    if parameters.robot != USUAL_ROBOT and parameters.limits != "fr3":
+        raise UsageError(
+            f"--limits {parameters.limits} are the Panda's, not those of --robot {parameters.robot}",
+            hint="leave --limits out: its description says its own",
+        )
     if inputs.get("transcript") is not None and parameters.proposer not in LANGUAGE_PROPOSERS:
         raise UsageError(
             f"--proposer {parameters.proposer} reads no --transcript",
@@ -79,7 +86,7 @@ STAGE = Stage(
     },
     writes=Packing,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "trimesh", "matplotlib"),
-    data_files=lambda parameters: ("robots/panda.toml",),
+    data_files=lambda parameters: robot_files(parameters.robot),
     check=check_inputs,
     example="scenewright pack --suite hard/unreachable --instance 3 --proposer ours --out outputs/pack",
 )

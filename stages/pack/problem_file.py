@@ -7,24 +7,25 @@ from pathlib import Path
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.packing import TABLE_TOP, PackingArea, PackingBox, PackingInstanceFile, PackingObstacle
 from scenewright.stages.kit.motion.failures import MotionFailed
-from scenewright.stages.pack.arm import HOME, FixedArm, Limits, ToolPose
+from scenewright.stages.pack.arm import FixedArm, ToolPose
 from scenewright.stages.pack.environment import X_RANGE, Y_RANGE, upright_block
 from scenewright.stages.pack.hand import tool_over_centre
 from scenewright.stages.pack.instances import Instance, Obstacle
 from scenewright.stages.pack.records import BoxState, Rectangle
 from scenewright.stages.pack.solids import overlap
+from scenewright.stages.pack.solved_arm import SolvedArm
 
 LARGEST_FILE = 1_000_000
 """Largest file that is read [bytes]; by eye."""
 FORM = "docs/LLM3.md shows the form"
 
 
-def read_problem(path: Path, limits: Limits) -> Instance:
+def read_problem(path: Path, arm: FixedArm | SolvedArm) -> Instance:
     """Read and check a problem. Raises BadInput: unreadable, a wrong field, boxes in each other, a box out of reach, a
     basket in which nothing can be placed."""
     instance = from_file(PackingInstanceFile.read(path, largest=LARGEST_FILE, hint=FORM), path.stem)
     _check_basket(instance, path)
-    _check_starts(instance, path, FixedArm(limits))
+    _check_starts(instance, path, arm)
     return instance
 
 
@@ -68,7 +69,7 @@ def _check_basket(instance: Instance, path: Path) -> None:
             )
 
 
-def _check_starts(instance: Instance, path: Path, arm: FixedArm) -> None:
+def _check_starts(instance: Instance, path: Path, arm: FixedArm | SolvedArm) -> None:
     blocks = [(box.name, upright_block(box, TABLE_TOP)) for box in instance.boxes]
     blocks += [(obstacle.rectangle.name, obstacle.block) for obstacle in instance.obstacles]
     for number, (name, block) in enumerate(blocks[: len(instance.boxes)]):
@@ -82,7 +83,7 @@ def _check_starts(instance: Instance, path: Path, arm: FixedArm) -> None:
     for box in instance.boxes:
         pose = ToolPose(box.x, box.y, TABLE_TOP + box.height / 2 + tool_over_centre(box.height), box.yaw)
         try:
-            arm.solve(pose, HOME)
+            arm.solve(pose, arm.home)
         except MotionFailed as failed:
             raise BadInput(
                 f"{path}: {box.name} cannot be picked where it starts: {failed.failure.message}",

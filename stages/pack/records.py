@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from scenewright.schemas.plan import Failure
+from scenewright.stages.pack.hand_shape import PUBLISHED, HandShape
 
 TWO = tuple[float, float]
 
@@ -42,6 +43,8 @@ class Observation:
     boxes: tuple[BoxState, ...]
     basket: Rectangle
     obstacles: tuple[Rectangle, ...] = ()
+    hand: HandShape = PUBLISHED
+    """That it is done with."""
 
 
 @dataclass(frozen=True)

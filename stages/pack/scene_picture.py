@@ -7,9 +7,9 @@ from matplotlib.colors import to_rgba
 from scenewright.schemas.packing import BASKET_TOP, TABLE_TOP
 from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
 from scenewright.stages.pack.arm import FixedArm
-from scenewright.stages.pack.arm_scene import FINGER_OPENING
 from scenewright.stages.pack.records import Rectangle
 from scenewright.stages.pack.solids import Block, block_over
+from scenewright.stages.pack.solved_arm import SolvedArm
 
 TABLE_COLOR, BASKET_COLOR = "#d8d2c4", "#a98d5f"
 FACTOR = 2
@@ -17,20 +17,20 @@ FACTOR = 2
 
 
 def render_scene(
-    arm: FixedArm,
+    arm: FixedArm | SolvedArm,
     joints: np.ndarray,
     blocks: list[tuple[str, Block]],
     colors: dict[str, str],
     basket: Rectangle,
     width: int,
 ) -> np.ndarray:
-    """Return (H, W, 3) uint8 of the arm at joint values (7,) among blocks, with each block's name -> colour."""
+    """Return (H, W, 3) uint8 of the arm at joint values (J,) among blocks, with each block's name -> colour."""
     client = engine.connect(engine.DIRECT)
     try:
         with native_output_to_stderr():
             robot = engine.loadURDF(str(arm.description.urdf), useFixedBase=True, physicsClientId=client)
         values = dict(zip(arm.description.arm_joints, joints.tolist(), strict=True))
-        values |= dict.fromkeys(arm.description.finger_joints, FINGER_OPENING)
+        values |= dict.fromkeys(arm.description.finger_joints, arm.description.opening / 2)
         for index in range(engine.getNumJoints(robot, physicsClientId=client)):
             name = engine.getJointInfo(robot, index, physicsClientId=client)[1].decode()
             if name in values:

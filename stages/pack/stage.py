@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,14 +34,14 @@ INSTANCES: dict[str, Callable[[str, PackParameters], Instance]] = {
 
 def run(problem: Path | None, transcript: Path | None, *, parameters: PackParameters, context: Context) -> Packing:
     """Pack the boxes of the user's problem, or of an instance of a suite."""
-    planner = MotionPlanner(parameters.limits, context.seed)
+    planner = MotionPlanner(parameters.limits, context.seed, parameters.robot)
     try:
-        instance = _instance(problem, parameters)
+        instance = replace(_instance(problem, parameters, planner), hand=planner.hand)
         proposer = _proposer(parameters, transcript, context)
         with PackingWorld(instance, planner=planner) as world:
             with context.progress.step("propose and check"):
                 result = run_loop(world, _Guarded(proposer), Budget(parameters.iterations, parameters.motion_calls))
-            _write(context.output, _packing_file(instance, proposer, result), instance, result)
+            _write(context.output, _packing_file(instance, proposer, result, planner), instance, result, planner)
             with context.progress.step("pictures"):
                 draw_layout(context.output / "layout.png", world, result, parameters.image_width)
                 draw_attempts(context.output / "attempts.png", result.attempts, parameters.image_width)
@@ -76,9 +77,9 @@ class _Guarded:
             self.calls = self._proposer.calls
 
 
-def _instance(problem: Path | None, parameters: PackParameters) -> Instance:
+def _instance(problem: Path | None, parameters: PackParameters, planner: MotionPlanner) -> Instance:
     if problem is not None:
-        return read_problem(problem, parameters.limits)
+        return read_problem(problem, planner.arm)
     suite, cell = parameters.suite.split("/")
     return INSTANCES[suite](cell, parameters)
 
@@ -114,10 +115,11 @@ def _attempt(attempt: Attempt) -> PackingAttempt:
     return PackingAttempt(steps=tuple(steps), task=attempt.task)
 
 
-def _packing_file(instance: Instance, proposer: Proposer, result: PackingRun) -> PackingFile:
+def _packing_file(instance: Instance, proposer: Proposer, result: PackingRun, planner: MotionPlanner) -> PackingFile:
     return PackingFile(
         name=instance.name,
         proposer=proposer.name,
+        robot=planner.arm.description.name,
         success=result.success,
         proposer_calls=result.proposer_calls,
         motion_planner_calls=result.motion_calls,
@@ -126,12 +128,12 @@ def _packing_file(instance: Instance, proposer: Proposer, result: PackingRun) ->
     )
 
 
-def _write(output: Path, file: PackingFile, instance: Instance, result: PackingRun) -> None:
+def _write(output: Path, file: PackingFile, instance: Instance, result: PackingRun, planner: MotionPlanner) -> None:
     file.write(output / "packing.json")
     to_file(instance).write(output / "instance.json")
     output.joinpath("plan.txt").write_text(plan_text(file), encoding="utf-8")
     paths = [motion.path for motion in result.motions] if result.success else []
-    joints = np.concatenate(paths) if paths else np.zeros((0, 7))
+    joints = np.concatenate(paths) if paths else np.zeros((0, len(planner.arm.home)))
     action = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
     np.savez(output / "trajectory.npz", joints=joints, action=action.astype(np.int64))
 

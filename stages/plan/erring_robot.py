@@ -34,7 +34,7 @@ class ErringRobot(PhysicalRobot):
     ) -> None:
         super().__init__(world, description, start, record_rate)
         self._random = random
-        self._encoders = encoder_errors(random)
+        self._encoders = encoder_errors(random, len(start.arm))
         self._error = np.zeros(3)
         """What is believed of the base less what is true, as of the last stop."""
 
@@ -53,7 +53,7 @@ class ErringRobot(PhysicalRobot):
         super().follow(replace(segment, path=path), item)
 
     def way_back(self) -> np.ndarray:
-        """Return (N, 10) rows, as believed, that go back to where the base came to rest."""
+        """Return (N, 3 + J) rows, as believed, that go back to where the base came to rest."""
         rows = super().way_back()
         return np.concatenate([rows[:, :3] + self._error, rows[:, 3:] - self._encoders], axis=1)
 

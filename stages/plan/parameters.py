@@ -13,6 +13,7 @@ from scenewright.schemas.language_map import LanguageMap
 from scenewright.schemas.plan import Plan
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.simulation.robot_option import robot_files, robot_option
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 STAND = "--stand X --stand Y --stand YAW, in metres and degrees"
@@ -36,7 +37,7 @@ class PlanParameters(Parameters):
         description="Named priors such as in(bottle,fridge_2): a thing of this class is believed to be there, hidden "
         "by closed furniture; its pose and shape are seen once the furniture is open",
     )
-    robot: str = Field("panda", description="Robot of data/robots/, or a description of your own (a .toml file)")
+    robot: str = robot_option()
     stand: tuple[float, ...] = Field(
         (),
         description="Where the robot starts: x y [m] and yaw [deg]; one that does not drive stays there. Empty: where "
@@ -90,12 +91,8 @@ class PlanParameters(Parameters):
 
 
 def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
-    """Return the files of `data/` that describe the robot, the user's own by their whole path, and what words need."""
-    from scenewright.stages.kit.simulation.robot_description import FOLDER, description_files
-
-    files = [file.resolve() for file in description_files(parameters.robot)]
-    names = [str(file.relative_to(FOLDER.parent) if FOLDER in file.parents else file) for file in files]
-    return (*names, "words/two_towers.safetensors", "words/calibration.toml")
+    """Return the files of `data/` that describe the robot, and what words need."""
+    return (*robot_files(parameters.robot), "words/two_towers.safetensors", "words/calibration.toml")
 
 
 def check_options(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:

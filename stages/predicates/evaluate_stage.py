@@ -78,7 +78,7 @@ def _sets(
         hint = "give the rooms to try it in: --scene FOLDER" if name == ROOM else "leave --scene out"
         raise BadInput(f"{where}: was learned in {'rooms' if name == ROOM else 'the kitchen'}", hint=hint)
     if scene is not None:
-        return [("rooms", [*room_tasks(read_rooms(scene), parameters.each, seed)], open_room)]
+        return [("rooms", [*room_tasks(read_rooms(scene, parameters.robot), parameters.each, seed)], open_room)]
     if folder is not None:
         return [(each.name, [*each.tasks], in_the_kitchen) for each in read_task_sets(folder, name, seed)]
     return [(which, tasks_of(name, which, parameters.each, seed), in_the_kitchen) for which in parameters.sets]

@@ -12,12 +12,14 @@ from scenewright.schemas.kitchen_plan import KitchenEvaluation, KitchenPlan
 from scenewright.schemas.learned_domain import LearnedDomain
 from scenewright.stages.kit.known_names import check_names
 from scenewright.stages.kit.language.options import LanguageParameters
+from scenewright.stages.kit.simulation.robot_option import check_robot_acts, robot_files, robot_option
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 DomainName = Literal["store_objects", "set_table", "cook_meal"]
 SetName = Literal["canonical", "more_objects", "novel_goals", "combined", "hundred_goals"]
 SET_NAMES: tuple[SetName, ...] = ("canonical", "more_objects", "novel_goals", "combined", "hundred_goals")
 LIBRARIES = ("numpy", "pymunk", "numba")
+IN_ROOMS = "in rooms: what it reaches and how far its hand opens"
 
 
 class TeachParameters(LanguageParameters):
@@ -35,6 +37,7 @@ class TeachParameters(LanguageParameters):
         "simulated", description="Who teaches: `terminal` asks you, and keeps what you say in teacher.jsonl"
     )
     wrong: float = Field(0.0, ge=0.0, le=0.5, description="Share of corrections that are wrong or missing")
+    robot: str = robot_option(IN_ROOMS)
 
 
 class PlanParameters(Parameters):
@@ -60,6 +63,7 @@ class EvaluateParameters(Parameters):
     )
     each: int = Field(10, ge=1, le=200, description="Tasks of each set, or of --scene")
     states: int = Field(1000, ge=10, le=20_000, description="States that each predicate is judged on")
+    robot: str = robot_option(IN_ROOMS)
 
 
 def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
@@ -68,9 +72,16 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
         raise UsageError("--goal: more than 2000 characters", hint="say less at a time")
 
 
+def check_teach(parameters: Any, inputs: Mapping[str, Any]) -> None:
+    """Raise UsageError for a robot without a room."""
+    acts = inputs.get("scene") is not None
+    check_robot_acts(parameters, acts=acts, without="the kitchen has no arm", hint="give the rooms: --scene FOLDER")
+
+
 def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) -> None:
-    """Raise UsageError for an unknown set, and as `check_tasks` does."""
+    """Raise UsageError for an unknown set, and as `check_tasks` and `check_teach` do."""
     check_tasks(parameters, inputs)
+    check_teach(parameters, inputs)
     check_names("--sets", parameters.sets, SET_NAMES)
 
 
@@ -86,6 +97,7 @@ def check_tasks(parameters: Any, inputs: Mapping[str, Any]) -> None:
 def kitchen_files(parameters: Any) -> tuple[str, ...]:
     """Return the files of `data/` that are read."""
     return (
+        *(robot_files(parameters.robot) if hasattr(parameters, "robot") else ()),
         "kitchen/kitchen.toml",
         "kitchen/truth.toml",
         "kitchen/store_objects.pddl",
@@ -110,6 +122,7 @@ TEACH = Stage(
     writes=LearnedDomain,
     libraries=(*LIBRARIES, "pillow"),
     module="teach_stage",
+    check=check_teach,
     data_files=kitchen_files,
     example="scenewright predicates teach --domain set_table --seed 1 --out outputs/predicates/table",
 )

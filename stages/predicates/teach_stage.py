@@ -37,12 +37,13 @@ class Course:
     opened: Opened
 
 
-def course_of(scene: Path | None, domain: str, count: int, seed: int) -> Course:
-    """Return the tasks of a kitchen, or of the rooms of a folder. Raises BadInput for rooms that are none."""
+def course_of(scene: Path | None, domain: str, count: int, seed: int, robot: str) -> Course:
+    """Return the tasks of a kitchen, or of the rooms of a folder as a robot reaches them. Raises BadInput for rooms
+    that are none, and as `load_robot` does."""
     if scene is None:
         tasks = tasks_of(domain, "train", count, seed)
         return Course(domain, KITCHEN, kitchen_file().domains[domain].actions, tasks, in_the_kitchen)
-    rooms: list[Task] = [*room_tasks(read_rooms(scene), count, seed)]
+    rooms: list[Task] = [*room_tasks(read_rooms(scene, robot), count, seed)]
     return Course(ROOM, ROOM_SETTING, tuple(ROOM_SETTING.arity), rooms, open_room)
 
 
@@ -56,7 +57,7 @@ def run(
     context: Context,
 ) -> LearnedDomain:
     """Teach in the kitchen, or in the rooms of `scene`; what `learned` holds is known from the beginning."""
-    course = course_of(scene, parameters.domain, parameters.tasks, context.seed)
+    course = course_of(scene, parameters.domain, parameters.tasks, context.seed, parameters.robot)
     memory = empty_memory(parameters.learner, course.setting)
     if learned is not None:
         memory = memory_of(learned.info, str(learned.root))

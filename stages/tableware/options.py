@@ -16,9 +16,7 @@ else:
     PolicyName = Literal[names_in(policies)]
 THESIS_TIMES = "tableware/thesis_times.json"
 PHYSICS_TIMES = "tableware/physics_times.json"
-ARM_FILES = ("robots/ur5_bench.toml", "robots/ur5.toml", "robots/ur5.urdf")
-"""Files below data/: times of actions and chances, fitted to the thesis's tables; the arm in physics, its times and
-files."""
+"""Files below data/: times of actions and chances, fitted to the thesis's tables; times of the arm in physics."""
 ChancesName = Literal["exact", "thesis", "thesis_spills", "thesis_failures"]
 
 

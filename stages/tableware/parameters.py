@@ -11,18 +11,12 @@ from scenewright.schemas.tableware_detections import TablewareDetections
 from scenewright.schemas.tableware_plan import TablewarePlan
 from scenewright.schemas.tableware_scene import TablewareScene
 from scenewright.schemas.tableware_trial import TablewareEvaluation, TablewareTrial
+from scenewright.stages.kit.simulation.robot_option import check_robot_acts, robot_files, robot_option
 from scenewright.stages.kit.stage import Optionally, Parameters, Stage
 from scenewright.stages.tableware import policies
 from scenewright.stages.tableware.detect_parameters import DETECT, DISHES_FILE
 from scenewright.stages.tableware.found_by_place import names_in
-from scenewright.stages.tableware.options import (
-    ARM_FILES,
-    PHYSICS_TIMES,
-    THESIS_TIMES,
-    ActionTimes,
-    PolicyName,
-    TierName,
-)
+from scenewright.stages.tableware.options import PHYSICS_TIMES, THESIS_TIMES, ActionTimes, PolicyName, TierName
 
 
 class SceneParameters(Parameters):
@@ -52,6 +46,7 @@ class SimulateParameters(ActionTimes):
 
     policy: PolicyName = Field("ours", description="Who decides, one action for each look at the table")
     simulator: Literal["fast", "physics"] = Field("fast", description="The fitted time model, or contact physics")
+    robot: str = robot_option("in physics, where it stands beside the table", default="ur5_bench")
     sight: Literal["truth", "image"] = Field(
         "truth", description="What the policy sees before each action: everything, or a new rendered image"
     )
@@ -90,6 +85,8 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
 
 def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options that exclude each other."""
+    acts = parameters.simulator == "physics"
+    check_robot_acts(parameters, acts=acts, without="the time model has no arm", hint="give --simulator physics too")
     if parameters.simulator == "physics" and parameters.delay > 0.0:
         raise UsageError("--delay belongs to the time model of --simulator fast", hint="leave it out for physics")
     if inputs.get("plan") is not None and parameters.sight == "image":
@@ -147,7 +144,7 @@ SIMULATE = Stage(
     data_files=lambda parameters: (
         THESIS_TIMES,
         PHYSICS_TIMES,
-        *(ARM_FILES if parameters.simulator == "physics" else ()),
+        *(robot_files(parameters.robot) if parameters.simulator == "physics" else ()),
     ),
     check=check_simulate,
     example="scenewright tableware simulate --scene outputs/tidy/scene --policy ours --out outputs/tidy/trial",

@@ -51,6 +51,7 @@ def run(
     TablewareTrialFile(
         policy="plan" if planned is not None else parameters.policy,
         simulator=parameters.simulator,
+        robot=simulator.recorded_robot,
         sight=parameters.sight,
         times=simulator.recorded_times,
         chances=simulator.recorded_chances,  # type: ignore[arg-type]

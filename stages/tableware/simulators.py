@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from scenewright.schemas.errors import BadInput, MissingDependency
 from scenewright.schemas.tableware_plan import TimesOfActions
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.tableware.parameters import SimulateParameters
 from scenewright.stages.tableware.planning.action import Action
 from scenewright.stages.tableware.planning.choice import as_times, chances_of, time_model
@@ -41,6 +42,7 @@ class Simulator(Protocol):
     recorded_times: TimesOfActions | None
     """As the artifact keeps them; None where time is what the world takes."""
     recorded_chances: str
+    recorded_robot: str
 
     def open(self, table: Table, seed: int, setting: Setting) -> World:
         """Return the world with a table in it."""
@@ -64,6 +66,7 @@ class FastSimulator:
         self.times, self.chances = time_model(parameters), chances_of(parameters.chances)
         self.recorded_times: TimesOfActions | None = as_times(self.times)
         self.recorded_chances: str = parameters.chances
+        self.recorded_robot = ""
 
     def open(self, table: Table, seed: int, setting: Setting) -> World:
         """Return the fast world."""
@@ -80,7 +83,7 @@ class FastSimulator:
 
 class PhysicsSimulator:
     """Contact physics; the arm's own times, but for those that are given explicitly. Raises MissingDependency where
-    there is no physics."""
+    there is no physics, and as `fitting_robot` does."""
 
     recorded_times: TimesOfActions | None = None
     recorded_chances: str = "contact"
@@ -95,6 +98,8 @@ class PhysicsSimulator:
         self.times = replace(arm, **{name: value for name, value in given_seconds.items() if value is not None})
         self.chances = replace(chances_of(parameters.chances), spills=True)
         self.again: Again | None = physics_part("physics_trial").alone
+        self._robot: RobotDescription = physics_part("hand_fit").fitting_robot(parameters.robot)
+        self.recorded_robot = self._robot.name
         self._recording = physics_part("recording").Recording()
         self._world: Any = None
 
@@ -105,7 +110,7 @@ class PhysicsSimulator:
                 "the arm in physics has the standard hand, the scene's dishes.toml has another",
                 hint="--simulator fast, or a dishes.toml without [gripper]",
             )
-        self._world = physics_part("physics").PhysicsTable(table, record=self._recording)
+        self._world = physics_part("physics").PhysicsTable(table, robot=self._robot, record=self._recording)
         world: World = self._world
         return world
 
@@ -122,8 +127,10 @@ class PhysicsSimulator:
             next((each.action.words for each in done if each.start <= seconds <= each.end + 1e-6), "")
             for seconds in frames["seconds"]
         ]
-        pictures.draw_physics_strip(frames, words, width).save(folder / "physics.png")
-        pictures.write_physics_animation(folder / "clearing.gif", frames, words, min(ANIMATION_WIDTH, width))
+        pictures.draw_physics_strip(frames, words, width, self._robot).save(folder / "physics.png")
+        pictures.write_physics_animation(
+            folder / "clearing.gif", frames, words, min(ANIMATION_WIDTH, width), self._robot
+        )
 
 
 SIMULATORS: dict[str, Callable[[SimulateParameters], Simulator]] = {"fast": FastSimulator, "physics": PhysicsSimulator}

@@ -60,7 +60,9 @@ def options() -> dict[str, set[str]]:
         }
 
     found = walk(inspect.getclosurevars(build_application()).nonlocals["table"], ())
-    below_steps = {words: found[words.replace(" ", "-")] for words in ("urdf check", "urdf settle", "export scene")}
+    below_steps = {
+        words: found[words.replace(" ", "-")] for words in ("urdf check", "urdf settle", "export scene", "export plan")
+    }
     return found | below_steps | dict.fromkeys(EXAMPLES, {"--panoptic-map", "--out"})
 
 

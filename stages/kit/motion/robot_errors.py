@@ -18,6 +18,6 @@ def stop_error(random: np.random.Generator) -> np.ndarray:
     return random.normal(0, 1, 3) * (LOCALISATION, LOCALISATION, TURNED)
 
 
-def encoder_errors(random: np.random.Generator) -> np.ndarray:
-    """Draw what the joints of an arm (7,) stand beside their encoders [rad]."""
-    return random.normal(0, JOINTS, 7)
+def encoder_errors(random: np.random.Generator, joints: int) -> np.ndarray:
+    """Draw what the joints of an arm (J,) stand beside their encoders [rad]."""
+    return random.normal(0, JOINTS, joints)

@@ -4,16 +4,17 @@ on a pedestal that drives or stands."""
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scenewright.schemas.errors import BadInput, MissingDependency, UsageError, first_problem
 from scenewright.schemas.outside import file_toml
 from scenewright.schemas.places import data_file
-from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
+from scenewright.stages.kit.simulation.urdf_split import mesh_file, read_urdf, with_absolute_meshes, without_visuals
 
 FOLDER = data_file("robots")
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
@@ -22,6 +23,9 @@ GROUND_CLEARANCE = 0.02
 """The pedestal hovers by this much: reconstructed floors are not flat to the millimetre."""
 JOINT_COUNTS = (6, 7)
 """Fewest and most: fewer cannot reach every pose, with more the planner was not tried."""
+FINGERS = 2
+MOST_RADIANS, MOST_DEGREES = 4 * np.pi, 1500.0
+"""No joint turns twice round to either side of zero, nor at two turns a second: what is more is in degrees."""
 HINT = "docs/MOTION.md (Robots) lists what a description says"
 
 
@@ -44,6 +48,8 @@ class RobotDescription:
     arm_forces: np.ndarray
     """(J,) most that the motor of each joint gives [N m]."""
     carry: np.ndarray
+    look: np.ndarray | None
+    """(J,) arm that holds a wrist camera over a surface in front; None: found when it is needed."""
     tip_overhang: float
     opening: float
     palm: tuple[float, float]
@@ -104,6 +110,7 @@ class _RobotFile(BaseModel):
     arm_acceleration: Positive
     arm_forces: tuple[Positive, ...]
     carry: Angles
+    look: Angles | None = None
     tip_overhang: NotNegative
     opening: Positive
     palm: tuple[Positive, Positive]
@@ -118,23 +125,45 @@ class _RobotFile(BaseModel):
 
 
 def description_files(robot: str) -> tuple[Path, ...]:
-    """Return the files that describe a robot, as far as they are the project's or the user's: its description, the one
-    that it is `like`, and its URDF. Those that are missing are left out, but for the first."""
-    path = description_path(robot)
-    if not path.is_file():
-        return (path,)
-    values = file_toml(path, error=UsageError, hint=HINT)
-    found = [path]
-    if isinstance(values.get("like"), str):
-        found.append(FOLDER / f"{values['like']}.toml")
-        values = (file_toml(found[1], error=UsageError, hint=HINT) if found[1].is_file() else {}) | values
-    found.append(path.parent / str(values.get("urdf", "")))
-    return tuple(found[:1] + [file for file in found[1:] if file.is_file()])
+    """Return the files that describe a robot, as far as they are the project's or the user's: its description, those
+    that it is `like`, and its URDF where that is there. Raises as `load_robot` does of a description alone."""
+    paths, values, folder = _read(description_path(robot))
+    urdf = folder / str(values.get("urdf", ""))
+    return (*paths, urdf) if urdf.is_file() else paths
+
+
+def _read(path: Path) -> tuple[tuple[Path, ...], dict[str, Any], Path]:
+    """Return the files of a description and of those that it is `like`, what they say together, and the folder of the
+    one that names the URDF. Raises BadInput."""
+    paths, values, folder = [path], file_toml(path, error=BadInput, hint=HINT), path.parent
+    while (like := values.pop("like", None)) is not None:
+        other = FOLDER / f"{like}.toml"
+        if not other.is_file() or other in paths:
+            raise BadInput(f"{paths[-1]}: like = {like!r} is no other robot of data/robots", hint=HINT)
+        folder = folder if "urdf" in values else FOLDER
+        values = file_toml(other, error=BadInput, hint=HINT) | values
+        paths.append(other)
+    return tuple(paths), values, folder
 
 
 def description_path(robot: str) -> Path:
-    """Return the description of a robot, given by the name of one of data/robots or by the path of a .toml file."""
-    return Path(robot) if robot.endswith(".toml") else FOLDER / f"{robot}.toml"
+    """Return the description of a robot, given by the name of one of data/robots or by the path of a .toml file. Raises
+    UsageError (no such robot)."""
+    path = Path(robot) if robot.endswith(".toml") else FOLDER / f"{robot}.toml"
+    if not path.is_file():
+        names = ", ".join(robot_names())
+        if robot.endswith((".urdf", ".xacro")):
+            raise UsageError(
+                f"{robot}: a URDF says too little of a robot (gripper, limits, base)",
+                hint="write a description that names it (docs/ROBOT.md)",
+            )
+        raise UsageError(f"no robot is called {robot!r}", hint=f"known: {names}, or a description of your own (.toml)")
+    return path
+
+
+def robot_names() -> list[str]:
+    """Return the names of the robots of data/robots."""
+    return sorted(entry.stem for entry in FOLDER.glob("*.toml"))
 
 
 def load_robot(robot: str) -> RobotDescription:
@@ -145,17 +174,8 @@ def load_robot(robot: str) -> RobotDescription:
     URDF), MissingDependency (its URDF is not there).
     """
     path = description_path(robot)
-    if not path.is_file():
-        names = ", ".join(sorted(entry.stem for entry in FOLDER.glob("*.toml")))
-        raise UsageError(f"no robot is called {robot!r}", hint=f"known: {names}, or a description of your own (.toml)")
-    values = file_toml(path, error=BadInput, hint=HINT)
-    folder = path.parent
-    if (like := values.pop("like", None)) is not None:
-        other = FOLDER / f"{like}.toml"
-        if not other.is_file():
-            raise BadInput(f"{path}: like = {like!r} is no robot of data/robots", hint=HINT)
-        folder = folder if "urdf" in values else FOLDER
-        values = file_toml(other, error=BadInput, hint=HINT) | values
+    _, values, folder = _read(path)
+    _check_said(values, path)
     try:
         described = _RobotFile(**values).model_dump()
     except ValidationError as error:
@@ -163,7 +183,9 @@ def load_robot(robot: str) -> RobotDescription:
     urdf = folder / described["urdf"]
     if not urdf.is_file():
         urdf = _installed(Path(described["urdf"]))
-    for key in ("lower", "upper", "arm_forces", "carry"):
+    for key in ("lower", "upper", "arm_forces", "carry", "look"):
+        if described[key] is None:
+            continue
         if len(described[key]) != len(described["arm_joints"]):
             wanted = len(described["arm_joints"])
             raise BadInput(f"{path}: {key} has {len(described[key])} values for {wanted} arm joints", hint=HINT)
@@ -173,11 +195,51 @@ def load_robot(robot: str) -> RobotDescription:
     return description
 
 
+def _check_said(values: dict[str, Any], path: Path) -> None:
+    """Raise BadInput for what a description lacks, an arm of other joints, a hand of other fingers, degrees, and a URDF
+    that lies elsewhere."""
+    lacking = [name for name, field in _RobotFile.model_fields.items() if field.is_required() and name not in values]
+    if lacking:
+        raise BadInput(f"{path}: does not say {', '.join(lacking)}", hint=HINT)
+    fewest, most = JOINT_COUNTS
+    if (count := _count(values["arm_joints"])) is not None and not fewest <= count <= most:
+        raise BadInput(f"{path}: arm_joints names {count}; an arm here has {fewest} or {most} joints", hint=HINT)
+    for key, what in (("finger_joints", "sliding joints"), ("finger_links", "links")):
+        if (count := _count(values[key])) is not None and count != FINGERS:
+            raise BadInput(f"{path}: {key} names {count}; a parallel gripper has {FINGERS} {what}", hint=HINT)
+    for key in ("lower", "upper", "carry", "look", "arm_speed"):
+        said = values.get(key)
+        for number in said if isinstance(said, list) else [said]:
+            if isinstance(number, int | float) and MOST_RADIANS < abs(number) <= MOST_DEGREES:
+                meant = f"{np.radians(number):.4g}"
+                raise BadInput(f"{path}: {key} says {number:g}, which looks like degrees", hint=f"in radians: {meant}")
+    named = values["urdf"]
+    if isinstance(named, str) and (".." in Path(named).parts or Path(named).is_absolute()):
+        raise BadInput(
+            f"{path}: urdf {named!r} is outside the folder of the description",
+            hint="put the URDF and its meshes beside the description, and name it from there",
+        )
+
+
+def _count(value: Any) -> int | None:
+    return len(value) if isinstance(value, list) else None
+
+
 def _check_joints(robot: RobotDescription, path: Path) -> None:
     """Raise BadInput where a description and its URDF do not fit each other."""
-    if np.any(robot.lower >= robot.upper) or np.any(robot.carry < robot.lower) or np.any(robot.carry > robot.upper):
-        raise BadInput(f"{path}: lower < upper and lower <= carry <= upper do not hold of every joint", hint=HINT)
+    for number, joint in enumerate(robot.arm_joints):
+        low, high = robot.lower[number], robot.upper[number]
+        if low >= high:
+            raise BadInput(f"{path}: joint {joint!r}: lower {low:g} is not below upper {high:g}", hint=HINT)
+        for key, arm in (("carry", robot.carry), ("look", robot.look)):
+            if arm is not None and not low <= arm[number] <= high:
+                problem = f"joint {joint!r}: {key} {arm[number]:g} is outside its limits {low:g} to {high:g}"
+                raise BadInput(f"{path}: {problem}", hint=HINT)
     root = read_urdf(robot.urdf)
+    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
+        raise BadInput(
+            f"{path}: {robot.urdf.name} is xacro, not URDF", hint="expand it first: xacro FILE.xacro > FILE.urdf"
+        )
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
     links = {link.get("name") for link in root.findall("link")}
     for name in (robot.arm_base, robot.hand_link, robot.tool_link, *robot.finger_links):
@@ -188,10 +250,26 @@ def _check_joints(robot: RobotDescription, path: Path) -> None:
             if kinds.get(name) not in allowed:
                 found = f"is {kinds[name]}" if name in kinds else "is not there"
                 raise BadInput(f"{path}: joint {name!r} of {robot.urdf.name} {found}, not {allowed[0]}", hint=HINT)
+    parents = Counter(child.get("link", "") for child in root.findall("joint/child"))
+    for link, count in parents.items():
+        if count > 1:
+            raise BadInput(
+                f"{path}: link {link!r} of {robot.urdf.name} hangs from {count} joints: the arm is not serial",
+                hint="leave the linkage out, one joint to each link",
+            )
     moving = [name for name in joints_between(root, robot.arm_base, robot.tool_link) if kinds[name] != "fixed"]
     if moving != list(robot.arm_joints):
+        if not joints_between(root, robot.arm_base, robot.tool_link):
+            raise BadInput(
+                f"{path}: {robot.tool_link!r} does not hang from {robot.arm_base!r}: tool_link, arm_base", hint=HINT
+            )
         what = ", ".join(moving) or "none"
         raise BadInput(f"{path}: from arm_base to tool_link move {what}: not arm_joints in their order", hint=HINT)
+    for mesh in root.findall("link/collision/geometry/mesh"):
+        file = mesh_file(mesh, robot.urdf.parent)
+        if not file.is_file():
+            name = mesh.get("filename", "")
+            raise BadInput(f"{path}: {robot.urdf.name}: mesh {name!r} is not there", hint=f"looked for as {file}")
 
 
 def joints_between(root: ElementTree.Element, base: str, tip: str) -> list[str]:

@@ -59,10 +59,18 @@ def with_absolute_meshes(robot: ElementTree.Element, folder: Path) -> str:
     """Return the URDF text with every mesh path made absolute from `folder` (also `package://` ones)."""
     copy = ElementTree.fromstring(ElementTree.tostring(robot))
     for mesh in copy.iter("mesh"):
-        name = mesh.get("filename", "").removeprefix("package://").removeprefix("file://")
-        if not Path(name).is_absolute():
-            mesh.set("filename", str((folder / name).resolve()))
+        if not Path(_mesh_name(mesh)).is_absolute():
+            mesh.set("filename", str(mesh_file(mesh, folder).resolve()))
     return ElementTree.tostring(copy, encoding="unicode")
+
+
+def mesh_file(mesh: ElementTree.Element, folder: Path) -> Path:
+    """Return the file that a <mesh> names, from `folder` where it names no whole path (also `package://` ones)."""
+    return folder / _mesh_name(mesh)
+
+
+def _mesh_name(mesh: ElementTree.Element) -> str:
+    return mesh.get("filename", "").removeprefix("package://").removeprefix("file://")
 
 
 def without_visuals(text: str) -> str:

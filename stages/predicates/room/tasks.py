@@ -16,7 +16,6 @@ from scenewright.stages.predicates.room.world import RoomWorld
 from scenewright.stages.predicates.tasks import Task
 from scenewright.stages.predicates.truth import ROOM, truth_of
 
-ROBOT = "panda"
 ITEMS, SUPPORTS, CONTAINERS = 4, 3, 2
 """Most things of each kind in a task: rooms have dozens, and what is learned is about pairs of them."""
 WALK, LITERALS, TRIES = 6, 2, 200
@@ -34,17 +33,17 @@ class RoomTask(Task):
         return RoomWorld(self.room, self.seed)
 
 
-def read_rooms(path: Path) -> list[RoomState]:
-    """Return what is perceived of the scenes of a folder: an interactive scene, the `room` of a ground truth, or a
-    folder of these, by name. Raises BadInput where there is none, or one with nothing to pick up or put things on."""
+def read_rooms(path: Path, robot: str) -> list[RoomState]:
+    """Return what a robot perceives of the scenes of a folder: an interactive scene, the `room` of a ground truth, or a
+    folder of these, by name. Raises BadInput where there is none, or one with nothing to pick up or put things on, and
+    as `load_robot` does."""
     folders = [path] if (path / "scene.json").is_file() else sorted(each.parent for each in path.glob("**/scene.json"))
     if not folders:
         raise BadInput(f"{path}: no scene.json there or below", hint="give what `urdf` or `synthesize` wrote")
-    robot = load_robot(ROBOT)
-    rooms = []
+    described, rooms = load_robot(robot), []
     for folder in folders:
         scene = InteractiveSceneFile.read(folder / "scene.json")
-        state = perceive(scene.bodies, ContactGraphFile.read(folder / "graph.json"), robot)
+        state = perceive(scene.bodies, ContactGraphFile.read(folder / "graph.json"), described)
         if not _kinds(state)[0] or not _kinds(state)[1]:
             raise BadInput(f"{folder}: nothing that a hand can take, or nothing to put it on", hint="another room")
         rooms.append(state)

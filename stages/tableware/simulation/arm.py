@@ -1,8 +1,8 @@
-"""The UR5 with its hand in a physics world: trajectories with contact, and quick ones above everything without.
+"""An arm with its hand in a physics world: trajectories with contact, and quick ones above everything without.
 
 Tool poses are world_from_tool (4, 4): origin between the fingertips, z out of the hand, y along which the fingers
-close. The arm keeps to one branch of its kinematics (elbow up, hand down), in which it reaches the whole table and the
-bin from where it stands.
+close. An arm built like the UR5 keeps to one branch of its kinematics (elbow up, hand down), in which it reaches the
+whole table and the bin from where it stands; any other takes the answer that moves its joints least.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from math import asin, atan2, hypot, pi
 import numpy as np
 from scenewright.stages.kit.motion.cartesian import follow, straight_poses
 from scenewright.stages.kit.motion.failures import MotionFailed
-from scenewright.stages.kit.motion.kinematics import arm_chain, forward, inverse_kinematics
+from scenewright.stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
 from scenewright.stages.kit.motion.timing import sample_times, time_path
 from scenewright.stages.kit.simulation.engine import engine
-from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
 from scenewright.stages.kit.simulation.world import PhysicsWorld
+from scipy.spatial.transform import Rotation
 
 BASE = np.array([0.0, -0.46, 0.15])
 """Place of the arm [m], higher than the table top: else the upper arm sweeps dishes off it when it reaches far."""
@@ -27,8 +28,6 @@ contact. By eye."""
 PAD_STIFFNESS, PAD_DAMPING = 4.0e4, 2.0e2
 """Give of the rubber [N/m, N s/m]: 2.5 MPa over a patch of 22 by 3 mm, 4 mm thick. Rigid pads would hold one of two
 utensils that lie on each other, the one wider by a tenth of a millimetre."""
-JOINT_EFFORTS = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
-"""Torques [N m] of the UR5's joints."""
 CLOSING_SPEED = 0.06
 """Speed of each finger [m/s]."""
 PAUSE = 0.15
@@ -37,17 +36,21 @@ STEP = 0.02
 """Distance between two poses of the tool on a straight way [m]; by eye."""
 ROOM_TO_TURN = pi
 """The last joint turns two half turns either way from its middle; an empty hand begins within one of them [rad]."""
-WRIST_OFFSET = 0.10915
-"""Distance of the arm's plane from the axis of its first joint [m]."""
+STARTS = 12
+"""Random starts of inverse kinematics for an arm of another build."""
+ARM = "ur5_bench"
+"""The arm of the thesis."""
 
 
 class Arm:
     """Moves; counts its time in `seconds`."""
 
-    def __init__(self, world: PhysicsWorld) -> None:
+    def __init__(self, world: PhysicsWorld, robot: RobotDescription) -> None:
         self.world = world
-        self.description = load_robot("ur5_bench")
-        self.chain = arm_chain(self.description)
+        self.description = robot
+        self.chain = arm_chain(robot)
+        self._aside = plane_offset(self.chain)
+        self._random_starts = random_starts(self.chain, STARTS, np.random.default_rng(7))
         self.seconds = 0.0
         urdf = self.description.urdf
         text = without_visuals(with_absolute_meshes(read_urdf(urdf), urdf.parent))
@@ -87,7 +90,7 @@ class Arm:
     # --- state ------------------------------------------------------------------------------------------------
 
     def values(self) -> np.ndarray:
-        """Return the arm's joint values (6,)."""
+        """Return the arm's joint values (J,)."""
         states = engine.getJointStates(self.body_id, self.joints, physicsClientId=self.world.client)
         return np.array([state[0] for state in states])
 
@@ -101,7 +104,7 @@ class Arm:
         return self.pose_of(self.values())
 
     def pose_of(self, arm: np.ndarray) -> np.ndarray:
-        """Return world_from_tool (4, 4) of joint values (6,)."""
+        """Return world_from_tool (4, 4) of joint values (J,)."""
         pose = forward(self.chain, arm)
         pose[:3, 3] += BASE
         return pose
@@ -111,7 +114,7 @@ class Arm:
         for index, value in zip(self.joints, arm, strict=True):
             engine.resetJointState(self.body_id, index, float(value), physicsClientId=self.world.client)
         self.target = np.array(arm, dtype=float)
-        self._command(self.target, np.zeros(6))
+        self._command(self.target, np.zeros(len(self.joints)))
 
     def _set_fingers(self, opening: float) -> None:
         for index in self.fingers:
@@ -121,7 +124,7 @@ class Arm:
     # --- kinematics -------------------------------------------------------------------------------------------
 
     def solve(self, pose: np.ndarray, *, held: bool = False) -> np.ndarray | None:
-        """Return joint values (6,) for a tool pose, None where it is not reached. With nothing held the one turned by
+        """Return joint values (J,) for a tool pose, None where it is not reached. With nothing held the one turned by
         half a turn will do as well, as the fingers are alike: the answer that moves the joints least is taken, of those
         that leave the last joint room for half a turn either way."""
         present_joints = self.target
@@ -131,25 +134,41 @@ class Arm:
             if half_turn:
                 wrist_pose[:3, :2] *= -1.0
             wrist_pose[:3, 3] -= BASE
-            radius = hypot(wrist_pose[0, 3], wrist_pose[1, 3])
-            if radius < WRIST_OFFSET:
-                continue
-            first = atan2(wrist_pose[1, 3], wrist_pose[0, 3]) - pi - asin(WRIST_OFFSET / radius)
-            first = first + 2 * pi * round((self.description.carry[0] - first) / (2 * pi))
-            starts = [np.array([first, -1.4, 1.6, -1.77, -pi / 2, last]) for last in (present_joints[5], 0.0, 2.0, 4.0)]
-            solution = inverse_kinematics(self.chain, wrist_pose, np.array(starts))
-            if solution.found and solution.arm[2] > 0.0:
+            solution = self._answer(wrist_pose)
+            if solution is not None:
                 for turns in (-2 * pi, 0.0, 2 * pi):
-                    arm = solution.arm.copy()
-                    arm[5] += turns
-                    if abs(arm[5]) < 2 * pi:
+                    arm = solution.copy()
+                    arm[-1] += turns
+                    if self.chain.lower[-1] <= arm[-1] <= self.chain.upper[-1]:
                         solutions.append(arm)
         if not solutions:
             return None
         return min(
             solutions,
-            key=lambda arm: (not held and abs(arm[5]) > ROOM_TO_TURN, float(np.abs(arm - present_joints).max())),
+            key=lambda arm: (not held and abs(arm[-1]) > ROOM_TO_TURN, float(np.abs(arm - present_joints).max())),
         )
+
+    def _answer(self, pose: np.ndarray) -> np.ndarray | None:
+        """Return joint values (J,) for a tool pose in the arm's frame, None where there are none."""
+        if self._aside is None:
+            here = inverse_kinematics(self.chain, pose, self.target[None])
+            if here.found:
+                return here.arm
+            starts = np.concatenate([self.description.carry[None], self._random_starts])
+            answers = (inverse_kinematics(self.chain, pose, start[None]) for start in starts)
+            return min(
+                (answer.arm for answer in answers if answer.found),
+                key=lambda arm: float(np.abs(arm - self.target).max()),
+                default=None,
+            )
+        radius = hypot(pose[0, 3], pose[1, 3])
+        if radius < self._aside:
+            return None
+        first = atan2(pose[1, 3], pose[0, 3]) - pi - asin(self._aside / radius)
+        first = first + 2 * pi * round((self.description.carry[0] - first) / (2 * pi))
+        starts = np.array([[first, -1.4, 1.6, -1.77, -pi / 2, last] for last in (self.target[5], 0.0, 2.0, 4.0)])
+        solution = inverse_kinematics(self.chain, pose, starts)
+        return solution.arm if solution.found and solution.arm[2] > 0.0 else None
 
     # --- motion -----------------------------------------------------------------------------------------------
 
@@ -172,7 +191,7 @@ class Arm:
         self._follow(times, points)
 
     def _path(self, ends: list[np.ndarray], step: float) -> tuple[np.ndarray, float]:
-        """Return joint values (K, 6) along straight lines through poses, a pose each `step` [m], and their length [m].
+        """Return joint values (K, J) along straight lines through poses, a pose each `step` [m], and their length [m].
         Raises MotionFailed."""
         poses, start, length = [], self.pose_of(self.target), 0.0
         for end in ends:
@@ -190,25 +209,25 @@ class Arm:
         return np.vstack([self.target, follow(self.chain, in_base, self.target)]), length
 
     def move_joints(self, end: np.ndarray, share: float) -> None:
-        """Move all joints to `end` (6,) at a share of the arm's speed and acceleration, with physics."""
+        """Move all joints to `end` (J,) at a share of the arm's speed and acceleration, with physics."""
         times, points = time_path(np.array([self.target, end]), *self._limits(share))
         self._follow(times, points)
 
     def jump(self, end: np.ndarray) -> None:
-        """Move the empty hand above everything to `end` (6,): nothing is met, so that only the time is counted."""
+        """Move the empty hand above everything to `end` (J,): nothing is met, so that only the time is counted."""
         times, _ = time_path(np.array([self.target, end]), *self._limits(1.0))
         self.seconds += float(times[-1])
         self.put(end)
 
     def lowest(self, end: np.ndarray) -> float:
-        """Return the least height [m] of the tool on the way to `end` (6,) in joint space."""
+        """Return the least height [m] of the tool on the way to `end` (J,) in joint space."""
         shares = np.linspace(0.0, 1.0, 12)[:, None]
         return min(float(self.pose_of(row)[2, 3]) for row in self.target + shares * (end - self.target))
 
     def wait(self, seconds: float) -> None:
         """Hold still for a time [s]."""
         count = max(1, round(seconds / self.world.time_step))
-        self._command(self.target, np.zeros(6))
+        self._command(self.target, np.zeros(len(self.joints)))
         self.world.step(count)
         self.seconds += count * self.world.time_step
 
@@ -267,7 +286,8 @@ class Arm:
     # --- inside -----------------------------------------------------------------------------------------------
 
     def _limits(self, share: float) -> tuple[np.ndarray, np.ndarray]:
-        return (np.full(6, self.description.arm_speed * share), np.full(6, self.description.arm_acceleration * share))
+        count, robot = len(self.joints), self.description
+        return np.full(count, robot.arm_speed * share), np.full(count, robot.arm_acceleration * share)
 
     def _follow(self, times: np.ndarray, points: np.ndarray) -> None:
         if len(times) < 2:
@@ -288,11 +308,23 @@ class Arm:
             engine.POSITION_CONTROL,
             targetPositions=arm.tolist(),
             targetVelocities=velocity.tolist(),
-            positionGains=[0.3] * 6,
-            velocityGains=[1.0] * 6,
-            forces=JOINT_EFFORTS.tolist(),
+            positionGains=[0.3] * len(self.joints),
+            velocityGains=[1.0] * len(self.joints),
+            forces=self.description.arm_forces.tolist(),
             physicsClientId=self.world.client,
         )
+
+
+def plane_offset(chain: ArmChain) -> float | None:
+    """Return how far the arm's plane is from its first joint's axis [m], for an arm built like the UR5 (joints 2 to
+    4 parallel, the last three with offsets); None for another build."""
+    if len(chain.fixed) != 6:
+        return None
+    turns = [Rotation.from_matrix(fixed[:3, :3]).as_rotvec() for fixed in chain.fixed]
+    quarter = pi / 2
+    expected = [[0.0] * 3, [quarter, 0.0, 0.0], [0.0] * 3, [0.0] * 3, [quarter, 0.0, 0.0], [-quarter, 0.0, 0.0]]
+    alike = np.abs(np.array(turns) - expected).max() < 1e-6 and chain.fixed[2, 0, 3] < 0.0
+    return float(chain.fixed[4, 2, 3]) if alike else None
 
 
 __all__ = ["BASE", "Arm", "MotionFailed"]

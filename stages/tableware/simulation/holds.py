@@ -162,7 +162,7 @@ def pair_hold(table: Table, first: str, second: str, point: tuple[float, float, 
         yaw = base.yaw + turned / 2
         across = np.array([-sin(yaw), cos(yaw)])
         apart = abs(float(across @ (np.array(beside.position[:2]) - np.array(base.position[:2]))))
-        opening = min(0.085, apart + base.measures.width + 0.014)
+        opening = min(HAND.opening, apart + base.measures.width + 0.014)
         tip = min(base.position[2], beside.position[2]) + ABOVE
         best: Hold | None = None
         for along in PAIR_SHIFTS:  # held away from their middles they would hang and swing
@@ -210,7 +210,7 @@ def _dish_pair(
         middle = abs(float(ahead @ (np.array(base.position[:2]) - np.array(point[:2]))))
         reach = max(reach, middle - inner)
     own_cargo = [item for name in names for item in cargo(table, name)]
-    opening = min(0.085, 2.0 * (reach + room))
+    opening = min(HAND.opening, 2.0 * (reach + room))
     return Hold(pose, opening, jaw_clearance(pose, opening, others, own_cargo))
 
 

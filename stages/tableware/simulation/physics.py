@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 from scenewright.stages.tableware.actions.grasp import Grasp
 from scenewright.stages.tableware.actions.pull import Pull
 from scenewright.stages.tableware.actions.stack import Stack
 from scenewright.stages.tableware.planning.action import Action, Primitive
-from scenewright.stages.tableware.simulation.arm import BACK_FRICTION, PAD_FRICTION, Arm
+from scenewright.stages.tableware.simulation.arm import ARM, BACK_FRICTION, PAD_FRICTION, Arm
 from scenewright.stages.tableware.simulation.holds import (
     FREE,
     Hold,
@@ -69,15 +70,20 @@ class Speeds:
 
 
 class PhysicsTable:
-    """A world as `fast.FastWorld`: `table`, `trial`, `do`."""
+    """A world as `fast.FastWorld`: `table`, `trial`, `do`. `robot`: by default the one of the thesis."""
 
     def __init__(
-        self, table: Table, *, speeds: Speeds | None = None, record: Callable[[PhysicsTable, str], None] | None = None
+        self,
+        table: Table,
+        *,
+        robot: RobotDescription | None = None,
+        speeds: Speeds | None = None,
+        record: Callable[[PhysicsTable, str], None] | None = None,
     ) -> None:
         self.speeds = speeds or Speeds()
         self.world = PhysicsWorld()
         self.top = Tabletop(self.world, table)
-        self.arm = Arm(self.world)
+        self.arm = Arm(self.world, robot or load_robot(ARM))
         self.record = record
         self.top.rest(1.0)
         self.table = self.top.read()
@@ -189,7 +195,7 @@ class PhysicsTable:
 
     def _retreat(self) -> None:
         """Let go and go straight up."""
-        self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.016))
+        self.arm.open_to(min(self.arm.description.opening, self.arm.finger_gap() + 0.016))
         pose = self.arm.pose_of(self.arm.target)
         try:
             self.arm.move_line(_at_height(pose, TRAVEL), self.speeds.descend)
@@ -218,7 +224,7 @@ class PhysicsTable:
         goal = self._bin_pose(up, offset)
         self.arm.move_joints(goal, self.speeds.carry_loose if loose else self.speeds.carry)
         self._key("over the bin")
-        self.arm.open_to(min(0.085, self.arm.finger_gap() + 0.03))
+        self.arm.open_to(min(self.arm.description.opening, self.arm.finger_gap() + 0.03))
         self.arm.wait(0.15)
         self.top.sweep()
         for _ in range(12):
@@ -345,7 +351,7 @@ class PhysicsTable:
         self.arm.move_through([above_base], self.speeds.lift)
         self.arm.move_line(down, 0.06)
         self._key("placed")
-        self.arm.open_to(min(0.085, self.arm.finger_gap() + 2 * 0.006))
+        self.arm.open_to(min(self.arm.description.opening, self.arm.finger_gap() + 2 * 0.006))
         self.arm.move_line(_at_height(down, down[2, 3] + 0.05), self.speeds.descend)
         self._key("let go")
 

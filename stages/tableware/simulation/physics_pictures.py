@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from PIL import Image
+from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.formats.link_poses import link_poses
 from scenewright.stages.kit.formats.urdf_file import parse_urdf
 from scenewright.stages.kit.geometry.transforms import look_at
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
-from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.shapes import link_shapes, paint
+from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes
 from scenewright.stages.tableware.simulation.arm import BASE
 from scenewright.stages.tableware.simulation.tabletop import BIN_CENTER, BIN_SIDE
 from scenewright.stages.tableware.table_pictures import captioned
@@ -33,7 +35,6 @@ TABLE_COLOR, BIN_COLOR, ARM_COLOR, HAND_COLOR = (236, 232, 224), (120, 128, 140)
 """Colours (RGB) of the table, the bin, the arm and the hand."""
 BIN_DEPTH, WALL = 0.12, 0.008
 """Depth of the bin, and thickness of its walls, as drawn [m]."""
-HAND_LINKS = ("hand", "left_finger", "right_finger")
 SHOWN = ("inside", "pulled", "placed", "lifted", "over the bin", "released")
 """Moments that are shown, of all that are recorded."""
 MOST_FRAMES = 64
@@ -43,15 +44,16 @@ MOST_FRAMES = 64
 class PhysicsPictures:
     """Draws the frames of `Recording.arrays()`."""
 
-    def __init__(self, frames: Mapping[str, np.ndarray], width: int) -> None:
+    def __init__(self, frames: Mapping[str, np.ndarray], width: int, robot: RobotDescription) -> None:
         self._frames = frames
         height = round(ASPECT * width)
         focal = 0.5 * width / float(np.tan(FIELD_OF_VIEW / 2))
         self._camera = Camera(width=width, height=height, fx=focal, fy=focal, cx=width / 2 - 0.5, cy=height / 2 - 0.5)
         self._view = look_at(EYE, TARGET)
-        self._robot = load_robot("ur5_bench")
+        self._robot = robot
+        self._hand = {robot.hand_link, *robot.finger_links}
         self._urdf = parse_urdf(self._robot.urdf)
-        self._links = link_shapes(self._robot.urdf.read_text(encoding="utf-8"), "visual")
+        self._links = _shown(robot)
         self._items = [
             _paint(item_mesh(Item(str(name), kind, (0.0, 0.0, 0.0), measures=Measures(*measures))), COLORS[kind])
             for name, kind, measures in zip(
@@ -71,16 +73,25 @@ class PhysicsPictures:
         return captioned(image, caption) if caption else image
 
     def _arm(self, joints: np.ndarray) -> list[trimesh.Trimesh]:
-        values = dict(zip(self._robot.arm_joints, joints[:6].tolist(), strict=True))
-        values |= {name: float(joints[6]) / 2 for name in self._robot.finger_joints}
+        values = dict(zip(self._robot.arm_joints, joints[:-1].tolist(), strict=True))
+        values |= {name: float(joints[-1]) / 2 for name in self._robot.finger_joints}
         meshes = []
         for link, pose in link_poses(self._urdf, values).items():
             world = pose.copy()
             world[:3, 3] += BASE
             for shape in self._links.get(link, ()):
                 mesh = shape.copy().apply_transform(world)
-                meshes.append(_paint(mesh, HAND_COLOR if link in HAND_LINKS else ARM_COLOR))
+                meshes.append(_paint(mesh, HAND_COLOR if link in self._hand else ARM_COLOR))
         return meshes
+
+
+def _shown(robot: RobotDescription) -> dict[str, list[trimesh.Trimesh]]:
+    """Return the shapes of each link: those to see, or to touch where the former are of a format that is not read."""
+    text = with_absolute_meshes(read_urdf(robot.urdf), robot.urdf.parent)
+    try:
+        return link_shapes(text, "visual")
+    except BadInput:
+        return link_shapes(text)
 
 
 def key_frames(labels: Sequence[str], most: int) -> list[int]:
@@ -93,12 +104,12 @@ def key_frames(labels: Sequence[str], most: int) -> list[int]:
 
 
 def draw_physics_strip(
-    frames: Mapping[str, np.ndarray], words: Sequence[str], width: int, most: int = 12
+    frames: Mapping[str, np.ndarray], words: Sequence[str], width: int, robot: RobotDescription, most: int = 12
 ) -> Image.Image:
     """Return key frames in rows of four; `words` says for each frame what is being done."""
     columns, gap = 4, 8
     each = (width - gap * (columns + 1)) // columns
-    pictures = PhysicsPictures(frames, each)
+    pictures = PhysicsPictures(frames, each, robot)
     rows = key_frames([str(label) for label in frames["labels"]], most)
     drawn = [pictures.draw(row, _caption(frames, words, row)) for row in rows]
     tallest = max((picture.height for picture in drawn), default=1)
@@ -109,9 +120,11 @@ def draw_physics_strip(
     return sheet
 
 
-def write_physics_animation(path: Path, frames: Mapping[str, np.ndarray], words: Sequence[str], width: int) -> None:
+def write_physics_animation(
+    path: Path, frames: Mapping[str, np.ndarray], words: Sequence[str], width: int, robot: RobotDescription
+) -> None:
     """Write a GIF of the key frames."""
-    pictures = PhysicsPictures(frames, width)
+    pictures = PhysicsPictures(frames, width, robot)
     rows = key_frames([str(label) for label in frames["labels"]], MOST_FRAMES)
     drawn = [pictures.draw(row, _caption(frames, words, row)) for row in rows]
     tallest = max(picture.height for picture in drawn)

@@ -29,7 +29,7 @@ class Recording:
         self.items |= world.top.items
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return labels (F,), seconds (F,), joints (F, 7) [rad, last the opening in m], names (N,), kinds (N,),
+        """Return labels (F,), seconds (F,), joints (F, J + 1) [rad, last the opening in m], names (N,), kinds (N,),
         measures (N, 6) as `Measures` has them, poses (F, N, 4, 4) world_from_item [m]."""
         names = sorted(self.items)
         away = np.full((4, 4), np.nan)

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import cast
 
 import numpy as np
 import pytest
+from scenewright.cli.main import run as run_command
 from scenewright.schemas.apartment import Apartment, Furniture, Room, Thing
 from scenewright.stages.agent.body import Body
 from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.scene_map import SceneMap, classes_not_of
 from scenewright.stages.agent.senses import Base, Detection, SeenFurniture, Sweep
 from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.beliefs import Beliefs
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.eyes import Surface, fuse
-from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, antipodal_grasps, within_reach
+from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, Jaws, antipodal_grasps, within_reach
 from scenewright.stages.agent.world.physics.hands import Target, whole_box
 from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
+from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.motion.kinematics import forward
 from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
+from scenewright.stages.kit.simulation.robot_description import load_robot
 
+JAWS = Jaws(0.08, (0.105, 0.033), 0.008)
 NO_ERRORS = Rates().with_true_eyes()
 TABLE = Furniture(name="table_0", label="table", centre=(2.0, 2.4), size=(1.4, 0.75), height=0.74)
 THINGS = (
@@ -72,6 +80,50 @@ def test_eyes_measure_and_the_hand_holds_by_contact(body: PhysicsBody) -> None:
     assert body.bodies["apple_0"].on == "plate_0" and body.root("apple_0") == "table_0" and body.events[-1].ok
 
 
+@pytest.mark.parametrize("robot", ["ur5e", "xarm7"])
+def test_another_arm_looks_takes_and_puts_down(robot: str) -> None:
+    other = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3, robot=robot)
+    try:
+        other.sweep()
+        seen = {d.label: d for d in other.look(ABOVE, close=False).detections}
+        assert set(seen) == {"apple", "cup", "plate"}
+        assert other.grasp(seen["apple"].position, "apple", 0).ok
+        assert other.release(seen["plate"].position, "plate", gently=True).ok
+        assert other.bodies["apple_0"].on == "plate_0"
+    finally:
+        other.close()
+
+
+def test_a_view_is_turned_by_the_first_joint_and_stays_within_its_limits() -> None:
+    for name in ("panda", "ur5e", "kinova_gen3"):
+        beliefs = Beliefs(load_robot(name))
+        try:
+            look = looking_arm(beliefs)
+            ahead = forward(beliefs.chain, look)
+            for by in (0.5, -2.0):
+                arm = turned(beliefs.chain, look, by)
+                assert np.all(arm >= beliefs.chain.lower) and np.all(arm <= beliefs.chain.upper)
+                expected = transform_from_yaw(by, np.zeros(3)) @ ahead
+                np.testing.assert_allclose(forward(beliefs.chain, arm), expected, atol=1e-6)
+        finally:
+            beliefs.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["--robot", "r2d2", "--simulation", "physics"], "no robot is called 'r2d2'"),
+        (["--robot", "ur5_bench", "--simulation", "physics"], "does not drive"),
+        (["--robot", "ur5e"], "the fast world has no arm"),
+    ],
+)
+def test_a_robot_that_cannot_do_it_is_refused(
+    words: list[str], problem: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(["agent", "run", *words, "--out", str(tmp_path / "episode"), "--quiet"]) == 2
+    assert problem in capsys.readouterr().err and not (tmp_path / "episode").exists()
+
+
 def test_what_cannot_be_done_says_why_with_numbers(body: PhysicsBody) -> None:
     body.sweep()
     body.look(ABOVE, close=False)
@@ -97,11 +149,11 @@ def test_grasps_come_from_above_first_and_across_the_narrow_side() -> None:
     random = np.random.default_rng(0)
     points = random.uniform((-0.08, -0.02, 0), (0.08, 0.02, 0.03), (4000, 3))
     side = np.sign(points[:, 1])[:, None] * np.array([0.0, 1.0, 0.0])
-    grasps = antipodal_grasps(points, side, opening=0.08, floor=0.0)
+    grasps = antipodal_grasps(points, side, JAWS, floor=0.0)
     assert np.allclose(grasps[0][:3, 2], (0, 0, -1), atol=1e-6) and abs(grasps[0][1, 1]) > 0.99
     assert all(pose[2, 3] > 0.004 for pose in grasps)
     wide = random.uniform(-0.08, 0.08, (4000, 3))
-    assert antipodal_grasps(wide, np.tile([0.0, 1.0, 0.0], (4000, 1)), opening=0.08, floor=-0.08) == []
+    assert antipodal_grasps(wide, np.tile([0.0, 1.0, 0.0], (4000, 1)), JAWS, floor=-0.08) == []
 
 
 def test_a_level_hand_grips_what_it_saw_the_front_of_about_its_axis() -> None:
@@ -109,7 +161,7 @@ def test_a_level_hand_grips_what_it_saw_the_front_of_about_its_axis() -> None:
     ring = 0.03 * np.column_stack([np.cos(angles), np.sin(angles)])
     points = np.concatenate([np.column_stack([ring, np.full(60, z)]) for z in np.linspace(0.0, 0.2, 40)])
     normals = np.column_stack([np.tile(ring / 0.03, (40, 1)), np.zeros(2400)])
-    grasps = within_reach(antipodal_grasps(points, normals, 0.08, -0.5, FORWARD_PITCHES), 0.0, 0.99)
+    grasps = within_reach(antipodal_grasps(points, normals, JAWS, -0.5, FORWARD_PITCHES), 0.0, 0.99)
     assert len(grasps) > 3 and all(abs(g[0, 3]) < 0.006 and abs(g[1, 3]) < 0.003 for g in grasps)
 
 
@@ -138,7 +190,7 @@ def test_a_few_grasps_of_each_steepness_and_none_from_behind() -> None:
     ring = np.column_stack([0.03 * np.cos(angles), 0.03 * np.sin(angles)])
     points = np.concatenate([np.column_stack([ring, np.full(60, z)]) for z in np.linspace(0.02, 0.1, 12)])
     normals = np.column_stack([np.tile(ring / 0.03, (12, 1)), np.zeros(720)])
-    grasps = within_reach(antipodal_grasps(points, normals, 0.08, 0.0), 0.0)
+    grasps = within_reach(antipodal_grasps(points, normals, JAWS, 0.0), 0.0)
     steep = [round(float(g[2, 2]), 1) for g in grasps]
     assert steep == sorted(steep) and max(steep.count(p) for p in set(steep)) <= 8 and len(set(steep)) == 3
     assert all(g[0, 2] > 0 for g in grasps if g[2, 2] > -0.99)
@@ -269,7 +321,7 @@ def test_a_thing_with_a_head_is_held_where_it_is() -> None:
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     ball = np.array([0.02, 0.0, 0.06]) + 0.022 * away
     points, normals = np.concatenate([top, ball]), np.concatenate([np.tile([0.0, 0.0, 1.0], (3000, 1)), away])
-    first = antipodal_grasps(points, normals, opening=0.08, floor=0.0)[0]
+    first = antipodal_grasps(points, normals, JAWS, floor=0.0)[0]
     assert first[2, 2] < -0.99 and np.hypot(*(first[:2, 3] - (0.02, 0.0))) < 0.01 and first[2, 3] > 0.045
 
 

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenewright.schemas.errors import UsageError
 from scenewright.stages.kit.motion.failures import MotionFailed
-from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_starts
+from scenewright.stages.kit.motion.kinematics import forward, inverse_kinematics, random_starts
 from scenewright.stages.kit.motion.rrt_connect import densify, first_collision
+from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.pack.arm import FixedArm, ToolPose
 from scenewright.stages.pack.arm_scene import ArmScene
 from scenewright.stages.pack.environment import PackingWorld, State
 from scenewright.stages.pack.hand import Named, held_block, tool_over_centre
+from scenewright.stages.pack.hand_shape import PUBLISHED, measured
 from scenewright.stages.pack.instances import BASKETS, Instance, Obstacle, Rectangle, published_instance
-from scenewright.stages.pack.motion import HOME_STANCE, MotionPlanner
+from scenewright.stages.pack.motion import HOME_STANCE, MotionPlanner, open_arm
+from scenewright.stages.pack.parameters import PackParameters, check_inputs
 from scenewright.stages.pack.records import Action, BoxState
 from scenewright.stages.pack.settling import rest_of
 from scenewright.stages.pack.solids import Block, flat_depth, overlap
+from scenewright.stages.pack.solved_arm import SolvedArm
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
@@ -168,3 +174,64 @@ def test_a_box_counts_as_packed_by_its_bounds(planner: MotionPlanner) -> None:
         assert outside(high[0] + 0.0151 - 0.035, 0.0, 0.0) == ("red_box",)
         assert outside(high[0] + 0.0149 - 0.035, 0.0, np.pi / 4) == ("red_box",)
         assert outside(0.65, low[1] - 0.0151 + 0.025, 0.0) == ("red_box",)
+
+
+# --- other arms ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module", params=["ur5e", "xarm7"])
+def other(request: pytest.FixtureRequest) -> Iterator[MotionPlanner]:
+    made = MotionPlanner(robot=request.param)
+    yield made
+    made.close()
+
+
+def test_another_arm_reaches_poses_by_search_and_says_how_far_it_is(other: MotionPlanner) -> None:
+    arm = other.arm
+    random = np.random.default_rng(0)
+    for _ in range(10):
+        radius, angle = random.uniform(0.4, 0.6), random.uniform(-0.8, 0.8)
+        pose = ToolPose(radius * np.cos(angle), radius * np.sin(angle), 0.1, random.uniform(-1.5, 1.5))
+        found = arm.solve(pose, arm.home)
+        np.testing.assert_allclose(forward(arm.chain, found), pose.matrix(), atol=2e-3)
+        assert np.all(found >= arm.chain.lower) and np.all(found <= arm.chain.upper)
+    beyond = arm.reach(0.1) + 0.05
+    with pytest.raises(MotionFailed) as failed:
+        arm.solve(ToolPose(beyond, 0.0, 0.1, 0.0), arm.home)
+    assert failed.value.failure.kind == "no_inverse_kinematics"
+    assert failed.value.failure.numbers["nearest_x"] == pytest.approx(arm.reach(0.1), abs=1e-6)
+
+
+def test_motions_of_another_arm_are_free_for_meshes(other: MotionPlanner) -> None:
+    standing = (Named("b", Block(0.6, 0.0, 0.3, 0.03, 0.04, 0.0, 0.08)),)
+    taken = other.plan(other.home, ToolPose(BOX.x, BOX.y, 0.04 + tool_over_centre(0.07), 0.0), None, standing)
+    placed = other.plan(taken.end, ToolPose(0.55, -0.15, 0.1, 0.5), BOX, standing)
+    scene = ArmScene(other.arm)
+    try:
+        scene.arrange(standing, None)
+        for motion, start in ((taken, other.home.arm), (placed, taken.end.arm)):
+            np.testing.assert_allclose(motion.path[0], start, atol=1e-9)
+            np.testing.assert_allclose(motion.path[-1], motion.end.arm, atol=1e-9)
+            assert first_collision(densify(motion.path, np.full(len(start), 0.05)), scene.check) is None
+            assert np.abs(np.diff(motion.path, axis=0)).max() < 0.4
+    finally:
+        scene.close()
+
+
+def test_a_hand_is_measured_by_its_shapes() -> None:
+    hand = measured(load_robot("ur5e"))
+    assert hand.palm == pytest.approx((0.038, 0.038, 0.047, 0.163)) and hand.tip_below == 0.0
+    assert hand.finger == pytest.approx((0.014, 0.007, 0.0, 0.105)) and hand.finger_offset == pytest.approx(0.0495)
+    franka = measured(load_robot("panda"))
+    assert franka.finger == PUBLISHED.finger and franka.palm[:2] == pytest.approx(PUBLISHED.palm[:2])
+
+
+def test_an_arm_of_the_frankas_build_keeps_its_closed_forms(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('like = "panda"\nname = "mine"\n')
+    mine = MotionPlanner(robot=str(tmp_path / "mine.toml"))
+    assert isinstance(mine.arm, FixedArm)
+    motion = mine.plan(mine.home, ToolPose(0.5, 0.1, 0.1, 0.0), None, ())
+    assert motion.path.shape[1] == 7 and mine.mesh_calls == 0
+    assert isinstance(open_arm("fr3", "ur5"), SolvedArm)
+    with pytest.raises(UsageError, match="--limits panda are the Panda's"):
+        check_inputs(PackParameters(robot="ur5", limits="panda"), {})

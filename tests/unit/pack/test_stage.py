@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenewright.schemas.errors import BadInput, UsageError
-from scenewright.schemas.packing import Packing
+from scenewright.schemas.packing import Packing, PackingFile
 from scenewright.stages.kit.language.failures import LanguageFailed
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
+from scenewright.stages.pack.arm import FixedArm
 from scenewright.stages.pack.parameters import STAGE, PackParameters, Suite
 from scenewright.stages.pack.problem_file import from_file, read_problem, to_file
 from scenewright.stages.pack.stage import run
@@ -48,6 +49,24 @@ def test_the_step_writes_the_same_bytes_twice(tmp_path: Path) -> None:
         actions = sum(len(attempt.steps) for attempt in results[0].info.attempts[-1:])
         assert arrays["joints"].shape == (len(arrays["action"]), 7)
         assert set(arrays["action"].tolist()) == set(range(actions))
+
+
+def test_the_usual_arm_packs_as_it_ever_did(tmp_path: Path) -> None:
+    """Beside the golden packing: the same plans, reasons and joint values."""
+    golden = Path(__file__).resolve().parents[2] / "golden" / "v1" / "packing"
+    packed = pack(tmp_path / "again", suite="hard/obstacles", instance=2)
+    assert packed.info == PackingFile.read(golden / "packing.json")
+    assert packed.path("plan.txt").read_text() == (golden / "plan.txt").read_text()
+    with np.load(golden / "trajectory.npz") as old, np.load(tmp_path / "again" / "trajectory.npz") as new:
+        np.testing.assert_array_equal(new["action"], old["action"])
+        np.testing.assert_allclose(new["joints"], old["joints"], atol=1e-9)
+
+
+def test_another_arm_packs_the_same_problem(tmp_path: Path) -> None:
+    packed = pack(tmp_path / "a", suite="published/easy", robot="xarm7")
+    assert packed.outcome == "ok" and packed.info.robot == "xarm7"
+    with np.load(tmp_path / "a" / "trajectory.npz") as arrays:
+        assert arrays["joints"].shape == (len(arrays["action"]), 7) and len(arrays["action"]) > 50
 
 
 def test_a_problem_of_ones_own_and_one_without_a_solution(tmp_path: Path) -> None:
@@ -96,7 +115,7 @@ def test_wrong_problems_are_refused_in_one_line(tmp_path: Path, change: dict[str
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(PROBLEM | change))
     with pytest.raises(BadInput) as refused:
-        read_problem(path, "fr3")
+        read_problem(path, FixedArm())
     assert said in str(refused.value) and "\n" not in str(refused.value) and refused.value.hint
 
 
@@ -106,13 +125,13 @@ def test_any_bytes_are_a_problem_or_bad_input(tmp_path_factory: pytest.TempPathF
     path = tmp_path_factory.mktemp("problem") / "p.json"
     path.write_bytes(data)
     with pytest.raises(BadInput):
-        read_problem(path, "fr3")
+        read_problem(path, FixedArm())
 
 
 def test_a_problem_is_the_same_after_a_round_trip(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(PROBLEM))
-    instance = read_problem(path, "fr3")
+    instance = read_problem(path, FixedArm())
     assert from_file(to_file(instance), "mine") == instance
 
 

@@ -91,9 +91,22 @@ def test_it_is_tried_in_rooms_and_not_in_the_kitchen(scene: Path, learned: Path,
 
 def test_rooms_without_things_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no scene.json"):
-        read_rooms(tmp_path)
+        read_rooms(tmp_path, "panda")
     with pytest.raises(BadInput, match="no goal was found"):
         room_tasks([RoomState({"cup_1": ROOM.bodies["cup_1"]})], 1, 0)
+
+
+def test_another_robot_reaches_and_grips_otherwise(scene: Path) -> None:  # noqa: F811
+    (panda,), (gen3,) = read_rooms(scene, "panda"), read_rooms(scene, "kinova_gen3")
+    assert (panda.hand_opening, gen3.hand_opening) == (0.08, 0.085)
+    assert panda.bodies == gen3.bodies and panda.reach != gen3.reach
+
+
+def test_a_robot_that_is_none_or_has_no_room_is_refused(scene: Path, tmp_path: Path) -> None:  # noqa: F811
+    words = ["predicates", "teach", "--out", str(tmp_path / "out"), "--quiet", "--robot"]
+    assert run_command([*words, "r2d2", "--scene", str(scene)]) == 2
+    assert run_command([*words, "ur5e"]) == 2
+    assert not (tmp_path / "out").exists()
 
 
 # --- a person as the teacher ----------------------------------------------------------------------------------

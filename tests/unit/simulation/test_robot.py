@@ -10,6 +10,7 @@ from scenewright.schemas.errors import UsageError
 from scenewright.stages.kit.simulation.robot import Configuration, Robot
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.world import load_scene
+from scenewright.stages.plan.erring_robot import ErringRobot
 
 from tests.unit.simulation.handmade_scene import bottle, floor, write_scene
 
@@ -52,3 +53,13 @@ def test_grasp_needs_both_fingers(tmp_path: Path) -> None:
             if not expected:
                 with pytest.raises(ValueError, match="do not grasp"):
                     robot.hold("bottle_7", 50.0)
+
+
+def test_an_arm_of_six_joints_stands_beside_its_encoders_too(tmp_path: Path) -> None:
+    write_scene(tmp_path, [floor()])
+    robot = load_robot("ur5e")
+    with load_scene(tmp_path) as world:
+        start = Configuration(np.zeros(3), robot.carry, robot.opening)
+        erring = ErringRobot(world, robot, start, 1.0, np.random.default_rng(0))
+        (back,) = erring.way_back()
+        assert back.shape == (9,) and 0 < np.abs(back[3:] - robot.carry).max() < 0.05

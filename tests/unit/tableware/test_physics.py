@@ -8,15 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.stages.kit.motion.kinematics import arm_chain, forward
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.tableware.actions.grasp import Grasp, grasp, grasp_two
 from scenewright.stages.tableware.actions.stack import stack
-from scenewright.stages.tableware.parameters import SimulateParameters
+from scenewright.stages.tableware.parameters import SimulateParameters, check_simulate
 from scenewright.stages.tableware.planning.action import Action
 from scenewright.stages.tableware.planning.rules import Rules, why_not_pulled
 from scenewright.stages.tableware.planning.time_model import TimeModel
 from scenewright.stages.tableware.simulation.arm_times import FILE, ArmTimes, arm_times
+from scenewright.stages.tableware.simulation.hand_fit import fitting_robot, tips
 from scenewright.stages.tableware.simulation.holds import Hold, pair_hold, rim_hold, unevenness
 from scenewright.stages.tableware.simulation.physics import PhysicsTable, Speeds, finger_force
 from scenewright.stages.tableware.simulation.physics_pictures import key_frames
@@ -61,6 +63,25 @@ def test_the_arm_moves_as_its_published_lengths_say() -> None:
     for _ in range(20):
         arm = random.uniform(-pi, pi, 6)
         assert np.allclose(forward(chain, arm), by_table(arm), atol=1e-6)
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "xarm7"])
+def test_another_arm_with_the_same_hand_bins_a_cup(robot: str) -> None:
+    world = PhysicsTable(Table((make_item("it", "cup", 0.1, 0.1, 0.4),)), robot=fitting_robot(robot))
+    world.do(grasp(world.table, "it", 0.5))
+    assert (world.trial.moved, world.trial.dropped, world.troubles) == (1, 0, [])
+    world.close()
+
+
+def test_the_measures_of_a_hand_are_those_of_its_description() -> None:
+    assert tips(load_robot("ur5e")) == pytest.approx((0.007, 0.011, 0.0), abs=1e-9)
+    with pytest.raises(BadInput, match="its hand opens 80 mm; holds of dishes are made for 85 mm"):
+        fitting_robot("panda")
+
+
+def test_a_robot_without_physics_is_refused() -> None:
+    with pytest.raises(UsageError, match="--robot ur5e: the time model has no arm"):
+        check_simulate(SimulateParameters(robot="ur5e"), {})
 
 
 @pytest.mark.parametrize("kind", ["cup", "bowl", "plate"])

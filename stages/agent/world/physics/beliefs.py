@@ -32,7 +32,7 @@ class Hold:
     rotation: np.ndarray
     """Of the hand then, base frame."""
     home: np.ndarray
-    """Arm (7,) with which it is carried about: folded, and the hand as upright as it grasped, since what is held above
+    """Arm (J,) with which it is carried about: folded, and the hand as upright as it grasped, since what is held above
     its middle swings between the fingers when they turn."""
 
 

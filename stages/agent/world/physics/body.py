@@ -19,6 +19,7 @@ from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
 from scenewright.stages.agent.world.physics.room import Body, Room
 from scenewright.stages.agent.world.physics.seen import Seen
 from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors
+from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 CLEARANCE = 2.9
 """Cells of the obstacle map that the base keeps from what is occupied."""
@@ -43,10 +44,11 @@ class PhysicsBody:
         rates: Rates,
         seed: int,
         segmenter: AskedSegmenter | None = None,
+        robot: str = USUAL_ROBOT,
     ) -> None:
         rates = replace(rates, hidden=0.0) if segmenter is None else replace(rates, hidden=0.0, feedback=0.0)
         self.apartment, self._room = apartment, Room(apartment)
-        self._robot = RobotInRoom(self._room, rates, seed)
+        self._robot = RobotInRoom(self._room, rates, seed, robot)
         self._asked = segmenter
         eyes = segmenter or NoisyOracle(self._room, SegmenterErrors(rates, self._robot.luck, sought))
         seen_by_robot = Seen(self._robot, CLEARANCE)

@@ -137,7 +137,7 @@ class Driving:
 
 
 def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Return (N, 10) rows of base poses (N, 3) with one arm (7,)."""
+    """Return (N, 3 + J) rows of base poses (N, 3) with one arm (J,)."""
     return np.concatenate([bases, np.tile(arm, (len(bases), 1))], axis=1)
 
 

@@ -6,14 +6,15 @@ side that was seen to face a finger is enough: of the other one it is believed t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 FINGER_DEPTH = 0.032
 """How far the tool point goes in behind the front of a thing [m]."""
 FINGER_BAND = 0.011
 """Half the breadth of a finger tip [m], and how far before and behind the tool point the fingers press."""
-PALM = (0.105, 0.033)
-"""Half the palm's extent along which the fingers close, and across [m]: it comes no nearer than fingers are long."""
 MARGIN = 0.012
 """Room between the open fingers and the thing, both sides together [m]."""
 ENDS = 0.008
@@ -47,17 +48,31 @@ ASIDE = 0.3
 """Least cosine between where an aslant hand comes from and where the robot stands: it does not reach around a thing."""
 STRAIGHT = 0.8
 """The same of a hand that goes into a shelf, which has walls."""
-TIP_BEFORE = 0.008
-"""The tool point lies this far behind the finger tips [m]."""
+
+
+@dataclass(frozen=True)
+class Jaws:
+    """What a grasp has to know of a hand [m]."""
+
+    opening: float
+    half_palm: tuple[float, float]
+    """Half the palm's extent along which the fingers close, and across: it comes no nearer than fingers are long."""
+    tip_before: float
+    """The tool point lies this far behind the finger tips."""
+
+    @classmethod
+    def of(cls, robot: RobotDescription) -> Jaws:
+        """Return those of a robot."""
+        return cls(robot.opening, (robot.palm[0] / 2, robot.palm[1] / 2), robot.tip_overhang)
 
 
 def antipodal_grasps(
-    points: np.ndarray, normals: np.ndarray, opening: float, floor: float, pitches: tuple[float, ...] = PITCHES
+    points: np.ndarray, normals: np.ndarray, jaws: Jaws, floor: float, pitches: tuple[float, ...] = PITCHES
 ) -> list[np.ndarray]:
     """Return map_from_tool (4, 4) of grasps of points (N, 3) with normals, of the first pitch first, where the fingers
     meet the surface squarely and near the middle of the thing before others: what is held by its end turns.
 
-    `opening` of the gripper [m]; `floor` [m]: height of what the thing stands on, over which the finger tips stay.
+    `floor` [m]: height of what the thing stands on, over which the finger tips stay.
     """
     low, high = np.percentile(points, 2, axis=0), np.percentile(points, 98, axis=0)
     ranked_grasps = []
@@ -65,9 +80,11 @@ def antipodal_grasps(
         deepest = max(high[2] - FINGER_DEPTH, (low[2] + high[2]) / 2 - 0.005)
         heights = [deepest] if pitch > STEEP else [low[2] + share * (high[2] - low[2]) for share in HEIGHTS]
         for height in heights:
-            at = np.array([*_middle_above(points, height), max(height, floor + 0.004 + TIP_BEFORE * np.sin(pitch))])
+            at = np.array(
+                [*_middle_above(points, height), max(height, floor + 0.004 + jaws.tip_before * np.sin(pitch))]
+            )
             for number in range(HEADINGS):
-                grasp = _grasp_at(points, normals, at, 2 * np.pi * number / HEADINGS, pitch, opening)
+                grasp = _grasp_at(points, normals, at, 2 * np.pi * number / HEADINGS, pitch, jaws)
                 if grasp is not None:
                     pose, square, width = grasp
                     off = round(abs(height - (low[2] + high[2]) / 2) / OFF)
@@ -86,7 +103,7 @@ def _middle_above(points: np.ndarray, height: float) -> np.ndarray:
 
 
 def _grasp_at(
-    points: np.ndarray, normals: np.ndarray, at: np.ndarray, heading: float, pitch: float, opening: float
+    points: np.ndarray, normals: np.ndarray, at: np.ndarray, heading: float, pitch: float, jaws: Jaws
 ) -> tuple[np.ndarray, float, float] | None:
     """Return map_from_tool (4, 4) with the tool at a point, how squarely the fingers meet the surface, and the width
     [m] there; None where it is too wide or in the way of the palm."""
@@ -94,7 +111,7 @@ def _grasp_at(
     closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
     axes = np.column_stack([np.cross(closing, approach), closing, approach])
     aside, along, depth = ((points - at) @ axes).T
-    way_in = (np.abs(aside) < FINGER_BAND) & (depth < TIP_BEFORE)
+    way_in = (np.abs(aside) < FINGER_BAND) & (depth < jaws.tip_before)
     between = way_in & (depth > -FINGER_BAND)
     if between.sum() < LEAST:
         return None
@@ -106,8 +123,8 @@ def _grasp_at(
         front = float(np.percentile(depth[way_in], 3))
         deeper = max(0.0, front + min((last - first) / 2, FINGER_DEPTH - BEFORE_PALM))
         depth = depth - deeper
-    under_palm = (np.abs(along) < PALM[0]) & (np.abs(aside) < PALM[1])
-    room = (opening - MARGIN) / 2
+    under_palm = (np.abs(along) < jaws.half_palm[0]) & (np.abs(aside) < jaws.half_palm[1])
+    room = (jaws.opening - MARGIN) / 2
     if np.abs(along[way_in]).max() > room or (under_palm & (depth < -FINGER_DEPTH)).sum() > LEAST:
         return None
     facing = np.abs(normals @ closing)

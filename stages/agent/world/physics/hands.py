@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scenewright.stages.agent.world.physics.beliefs import Beliefs, Box, Hold
 from scenewright.stages.agent.world.physics.eyes import Surface
-from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, STRAIGHT, antipodal_grasps, within_reach
+from scenewright.stages.agent.world.physics.grasps import (
+    FORWARD_PITCHES,
+    STRAIGHT,
+    Jaws,
+    antipodal_grasps,
+    within_reach,
+)
 from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -97,7 +103,7 @@ def plan_grasp(
 ) -> Motion:
     """Return the motion that takes a fused surface. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
     surface, name = target.surface, target.name
-    possible = _grasps_of(target, base, beliefs.description.opening)
+    possible = _grasps_of(target, base, Jaws.of(beliefs.description))
     if not possible:
         opening, width = beliefs.description.opening, narrowest_width(surface.points[_inside(surface)])
         raise MotionFailed(
@@ -131,19 +137,19 @@ def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.ran
     """Whether the hand gets straight to some grasp of a fused surface from a base pose (3,) and up again, free of all
     that is in the map."""
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
-    carry, grasps = beliefs.description.carry, _grasps_of(target, base, beliefs.description.opening)[:CANDIDATES]
+    carry, grasps = beliefs.description.carry, _grasps_of(target, base, Jaws.of(beliefs.description))[:CANDIDATES]
     return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
 
 
-def _grasps_of(target: Target, base: np.ndarray, opening: float) -> list[np.ndarray]:
+def _grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
     """Return the grasps of what was seen, map_from_tool (4, 4), that an arm on a base pose (3,) may get at."""
     surface = target.surface
     keep = _inside(surface)
     heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
     if target.behind > 0:
-        grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor, FORWARD_PITCHES)
+        grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], jaws, target.floor, FORWARD_PITCHES)
         return within_reach(grasps, target.inward, STRAIGHT)
-    grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], opening, target.floor)
+    grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], jaws, target.floor)
     return within_reach(grasps, heading)
 
 
@@ -204,7 +210,7 @@ def _one_grasp(
 def _way_in(
     planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, target: Target, map_from_tool: np.ndarray, tally: Tally
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return arm values (N, 7) from a grasp back to before it, and (M, 7) from it to above; None where one is not
+    """Return arm values (N, J) from a grasp back to before it, and (M, J) from it to above; None where one is not
     free."""
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
@@ -234,7 +240,7 @@ def _way_in(
 def _by_another_elbow(
     planner: ArmPlanner, base: np.ndarray, map_from_tool: np.ndarray, tally: Tally
 ) -> np.ndarray | None:
-    """Return free arm values (7,) for a tool pose that the arm gets to with its elbow in the way of something."""
+    """Return free arm values (J,) for a tool pose that the arm gets to with its elbow in the way of something."""
     chain, tool_in_arm_frame = planner.model.chain, in_arm_frame(base, map_from_tool, planner.model.description)
     for start in random_starts(chain, ELBOWS, planner.random):
         solution = inverse_kinematics(chain, tool_in_arm_frame, start[None])

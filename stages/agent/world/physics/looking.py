@@ -21,6 +21,7 @@ from scenewright.stages.agent.world.physics.eyes import (
     seen_in,
 )
 from scenewright.stages.agent.world.physics.fronts import PARTS, Front
+from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
 from scenewright.stages.agent.world.physics.seen import FOUND_WITHIN, Seen
 from scenewright.stages.kit.geometry.cameras import back_project
@@ -28,8 +29,6 @@ from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.rendering.object_views import take
 
-VIEW = np.array([0.0, -0.9, 0.0, -2.2, 0.0, 2.1, 0.785])
-"""Arm that holds the wrist camera over a surface in front, looking down by 45 degrees [rad]."""
 SIDEWAYS = (0.0, -0.5, 0.5)
 """Turns of the first joint for the three wrist poses [rad]."""
 STEEP, OVER = (1.5, 1.3, 1.1), 0.45
@@ -49,6 +48,7 @@ class Looking:
 
     def __init__(self, robot: RobotInRoom, seen: Seen, segmenter: Segmenter, sought: tuple[str, ...]) -> None:
         self._robot, self._seen, self._segmenter, self._sought = robot, seen, segmenter, sought
+        self._view = looking_arm(robot.beliefs)
         self.looked_near: tuple[Base, Position] | None = None
         """From where it looked last from near by, and at what."""
         self.pictures: list[tuple[str, np.ndarray]] = []
@@ -88,7 +88,7 @@ class Looking:
         toward = (toward + pi) % (2 * pi) - pi
         surfaces: list[Surface] = []
         renderer = None
-        arms = [np.array([np.clip(toward + turn, -2.7, 2.7), *VIEW[1:]]) for turn in ((0.0,) if close else SIDEWAYS)]
+        arms = [turned(self._robot.beliefs.chain, self._view, toward + t) for t in ((0.0,) if close else SIDEWAYS)]
         shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
         if shelf is not None and not shelf.slides:
             arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)

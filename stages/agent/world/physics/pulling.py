@@ -286,7 +286,7 @@ class Pulling:
         return value if abs(value_seen - value) < SEEN_TO else value_seen
 
     def _tool(self, arm: np.ndarray) -> np.ndarray:
-        """Return the tool point (3,) of the map for joint values (7,)."""
+        """Return the tool point (3,) of the map for joint values (J,)."""
         robot = self._robot
         pose: np.ndarray = base_pose(robot.believed, robot.description) @ forward(robot.beliefs.chain, arm)
         return pose[:3, 3]

@@ -11,6 +11,7 @@ from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
+from scenewright.schemas.errors import UsageError
 from scenewright.stages.agent.senses import Base, Felt, FeltKind
 from scenewright.stages.agent.world.events import EventLog
 from scenewright.stages.agent.world.failures import Rates
@@ -24,7 +25,7 @@ from scenewright.stages.kit.motion.robot_errors import encoder_errors
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.rendering.segmenter_errors import Luck
 from scenewright.stages.kit.simulation.robot import Configuration, base_pose
-from scenewright.stages.kit.simulation.robot_description import load_robot
+from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
 
 TOOL_FROM_CAMERA = np.array([[0, -1, 0, 0.06], [1, 0, 0, 0], [0, 0, 1, -0.1], [0, 0, 0, 1]], float)
 """Pose (4, 4) of the wrist camera in the tool's frame [m]; by eye."""
@@ -34,6 +35,17 @@ ROOM_IN_HAND = 0.04
 """What is held may have turned or slid so far between the fingers [m]."""
 NEARER = 0.1
 """The arm is shorter than the one of the fast world: it starts so much nearer to a table before it [m]."""
+
+
+def driving_robot(robot: str) -> RobotDescription:
+    """Return the description of a robot. Raises as `load_robot` does, and UsageError for one that does not drive."""
+    description = load_robot(robot)
+    if not description.drives:
+        raise UsageError(
+            f"--robot {robot}: it does not drive, and what it is told is all over an apartment",
+            hint="give it a base_speed in its description, or take another robot",
+        )
+    return description
 
 
 FELT: dict[str, FeltKind] = {
@@ -52,12 +64,12 @@ def felt(failed: MotionFailed) -> Felt:
 class RobotInRoom:
     """Robot and room, with what goes wrong in them (`rates`, `luck`) and the log of it."""
 
-    def __init__(self, room: Room, rates: Rates, seed: int) -> None:
+    def __init__(self, room: Room, rates: Rates, seed: int, robot: str) -> None:
         self.room, self.rates, self.luck = room, rates, Luck(seed)
         self.random = np.random.default_rng([seed, 83])
-        self.description = load_robot("panda")
+        self.description = driving_robot(robot)
         self.beliefs = Beliefs(self.description)
-        self.joint_error = encoder_errors(self.random)
+        self.joint_error = encoder_errors(self.random, len(self.description.arm_joints))
         self.error = np.zeros(3)
         """Of localisation: what is believed less what is true, as of the last stop."""
         x, y, yaw = room.apartment.start
@@ -102,7 +114,7 @@ class RobotInRoom:
 
     @property
     def home(self) -> np.ndarray:
-        """Arm (7,) with which it drives."""
+        """Arm (J,) with which it drives."""
         return self.description.carry if self.hold is None else self.hold.home
 
     def arm_to(self, arm: np.ndarray) -> None:
@@ -130,7 +142,7 @@ class RobotInRoom:
         self.driver.put(Configuration(self.true_base(), self.arm + self.joint_error, self.description.opening))
 
     def measured_arm(self) -> np.ndarray:
-        """Return the joint values (7,) by the encoders."""
+        """Return the joint values (J,) by the encoders."""
         return self.driver.robot.configuration().arm - self.joint_error
 
     def carefully(self, segment: Segment) -> None:
