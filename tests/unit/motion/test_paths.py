@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scenewright.stages.kit.acting.query import carrying
+from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.base_placement import base_query, plan_drive, sample_bases
 from scenewright.stages.kit.motion.collision import Collision, CollisionChecker
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -238,3 +239,25 @@ def test_joints_keep_their_acceleration_at_bends() -> None:
         assert np.all(np.abs(velocity) <= speed * (1 + 1e-9))
         assert np.all(np.abs(change) <= acceleration * 1.001)
         assert set(map(tuple, path.round(9))) <= set(map(tuple, points.round(9)))  # no corner is cut
+
+
+def test_a_body_that_is_put_elsewhere_for_a_while_comes_back_to_the_very_numbers(checker: CollisionChecker) -> None:
+    world, before = checker.world, checker.world.pose("bottle_7")
+    for step in range(5):
+        with world.posed("bottle_7", transform_from_yaw(0.3 * step, np.array([1.0, 2.0, 3.0 + step]))):
+            np.testing.assert_allclose(world.pose("bottle_7")[:3, 3], [1.0, 2.0, 3.0 + step], atol=1e-6)
+        np.testing.assert_array_equal(world.pose("bottle_7"), before)
+
+
+def test_what_is_asked_of_one_query_is_not_asked_of_the_next(checker: CollisionChecker) -> None:
+    """In whatever order checks are made, each answers under its own query."""
+    body = np.concatenate([[-1.3, -0.2, -np.pi / 2], PANDA.carry])
+    low = np.eye(4)
+    low[:3, 3] = [0.0, 0.0, 0.25]
+    alone, held = checker.check_meshes(body), checker.under(carrying("bottle_7", low))
+    collision = held.check_meshes(body)
+    assert alone is None and collision is not None
+    for _ in range(2):
+        assert checker.check_meshes(body) is None
+        assert held.check_meshes(body) == collision
+    assert checker.overlaps("bottle_7") == checker.under(carrying("cup_5", low)).overlaps("bottle_7")
