@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scenewright.schemas.errors import BadInput, MissingDependency, UsageError, first_problem
 from scenewright.schemas.outside import file_toml
 from scenewright.schemas.places import data_file
+from scenewright.stages.kit.formats.urdf_file import parse_urdf
 from scenewright.stages.kit.simulation.urdf_split import mesh_file, read_urdf, with_absolute_meshes, without_visuals
 
 FOLDER = data_file("robots")
@@ -24,6 +25,7 @@ GROUND_CLEARANCE = 0.02
 JOINT_COUNTS = (6, 7)
 """Fewest and most: fewer cannot reach every pose, with more the planner was not tried."""
 FINGERS = 2
+SHORTEST_AXIS = 1e-6
 MOST_RADIANS, MOST_DEGREES = 4 * np.pi, 1500.0
 """No joint turns twice round to either side of zero, nor at two turns a second: what is more is in degrees."""
 HINT = "docs/MOTION.md (Robots) lists what a description says"
@@ -250,6 +252,10 @@ def _check_joints(robot: RobotDescription, path: Path) -> None:
             if kinds.get(name) not in allowed:
                 found = f"is {kinds[name]}" if name in kinds else "is not there"
                 raise BadInput(f"{path}: joint {name!r} of {robot.urdf.name} {found}, not {allowed[0]}", hint=HINT)
+    for read in parse_urdf(robot.urdf).joints:
+        turns = np.isfinite(read.axis).all() and np.linalg.norm(read.axis) > SHORTEST_AXIS
+        if read.name in (*robot.arm_joints, *robot.finger_joints) and not turns:
+            raise BadInput(f"{path}: joint {read.name!r} of {robot.urdf.name}: its axis has no direction", hint=HINT)
     parents = Counter(child.get("link", "") for child in root.findall("joint/child"))
     for link, count in parents.items():
         if count > 1:

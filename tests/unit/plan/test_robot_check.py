@@ -146,6 +146,12 @@ LINKAGE = '<joint name="second" type="fixed"><parent link="base"/><child link="f
             "own.urdf is xacro, not URDF (expand it first",
         ),
         ("", "<robot", "own.urdf"),
+        (
+            "",
+            UR5.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', 1),
+            "'shoulder_joint' of own.urdf: its axis has no",
+        ),
+        ("", UR5.replace('xyz="0 0 0.089159"', 'xyz="0 0"'), "joint 'upper_arm_joint': origin xyz: '0 0' is not 3"),
     ],
 )
 def test_what_is_no_robot_is_one_line(
