@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 
 from scenewright.schemas.base import Model
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
 from scenewright.schemas.places import data_file
 
-FILE = data_file("class_counts.toml")
+FILE = "class_counts.toml"
 
 
 class ClassCounts(Model):
@@ -28,5 +28,4 @@ class ClassCounts(Model):
 @cache
 def class_counts() -> ClassCounts:
     """Read data/class_counts.toml once."""
-    with FILE.open("rb") as file:
-        return ClassCounts(**tomllib.load(file))
+    return ClassCounts.model_validate(file_toml(data_file(FILE), LARGEST_SETTINGS))

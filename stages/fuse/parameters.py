@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 from scenewright.schemas.articulations import Articulations
+from scenewright.schemas.class_counts import FILE as CLASS_COUNTS
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.segments import Segments
@@ -162,7 +163,7 @@ STAGE = Stage(
     },
     writes=PanopticMap,
     libraries=("numpy", "numba", "scipy"),
-    data_files=lambda parameters: LABEL_TABLES,
+    data_files=lambda parameters: (*LABEL_TABLES, CLASS_COUNTS),
     check=check,
     example="scenewright fuse --sequence outputs/demo/sequence --segments outputs/demo/segments "
     "--out outputs/demo/panoptic_map",

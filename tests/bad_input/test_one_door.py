@@ -151,7 +151,6 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/synthesize/recipes.py": {"open": OURS, "tomllib.load": OURS},
     "stages/tableware/scene_files.py": {"Image.open": PICTURE},
     "stages/tableware/simulate_stage.py": {"open": WORLD},
-    "stages/tableware/simulation/physics_pictures.py": {"read_text": OURS},
     "stages/tableware/vision/image_files.py": {"cv2.imread": PICTURE},
     "stages/truth/stage.py": {"tomllib.loads": OURS, "read_text": OURS},
 }
