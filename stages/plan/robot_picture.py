@@ -54,6 +54,7 @@ def draw_robot_check(path: Path, robot: RobotDescription, report: RobotReport) -
         side.set_ylabel("over the floor [m]")
         front.set_title(f"gripper, open {1000 * robot.opening:.0f} mm")
         front.set_xlabel("y of the tool [m]: the fingers close along it")
+        front.locator_params(nbins=4, axis="x")
         front.set_ylabel("z of the tool [m]: out of the hand")
         for axes in (side, front):
             axes.set_aspect("equal")
