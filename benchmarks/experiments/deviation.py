@@ -1,4 +1,4 @@
-"""What the standard deviation that `disparity` writes beside depth is worth: whether it is true, and whether it betters a map.
+"""Whether the standard deviation that `disparity` writes beside depth is true, and whether it betters a map.
 
 Rooms of two eyes, matched and fused as `reconstruct-stereo` does: `weighed` by the deviations, `even` without them, and
 `strict`, without them too but of pixels alone whose confidence is STRICT or more. Surface is compared with the true
