@@ -28,7 +28,7 @@ CLASSES = 10
 SPREAD = float(np.log(4.0 / 0.05))
 """Things without a name have any extent from 0.05 to 4 m: width of its logarithm."""
 USUAL_SPREAD = float(np.log(4.0))
-"""Width of the logarithm of the extent of a class of which no smallest extent is known."""
+"""Width of the logarithm of the extent of a class of which no range of extents is known."""
 SILENT = 0.1
 """Least share of looks at a thing that say nothing."""
 SELDOM = 0.2
@@ -134,7 +134,7 @@ def prior_odds(class_name: str) -> float:
     """Return how much likelier a thing of a possible extent has the name than none, before anybody said anything."""
     counts, largest = class_counts(), LARGEST_EXTENT.get(class_name)
     smallest = SMALLEST_EXTENT.get(class_name)
-    spread = SPREAD if largest is None else USUAL_SPREAD if smallest is None else float(np.log(largest / smallest))
+    spread = USUAL_SPREAD if largest is None or smallest is None else float(np.log(largest / smallest))
     return counts.of(class_name) / counts.nameless * SPREAD / spread
 
 

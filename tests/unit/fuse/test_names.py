@@ -141,8 +141,9 @@ def test_the_prior_is_the_share_of_annotated_things_and_the_range_of_sizes() -> 
     counts = class_counts()
     chairs = counts.of("chair") / counts.nameless
     assert prior_odds("chair") == pytest.approx(chairs * np.log(4 / 0.05) / np.log(1.8 / 0.3))
-    assert prior_odds("desk") == pytest.approx(counts.of("desk") / counts.nameless), "no range is known"
-    assert prior_odds("a class of one's own") == pytest.approx(counts.rare / counts.nameless)
+    unknown = np.log(4 / 0.05) / np.log(4.0)
+    assert prior_odds("desk") == pytest.approx(counts.of("desk") / counts.nameless * unknown), "no range is known"
+    assert prior_odds("a class of one's own") == pytest.approx(counts.rare / counts.nameless * unknown)
     assert set(counts.counts) <= {entry.name for entry in VOCABULARY.classes}
 
 
