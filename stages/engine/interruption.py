@@ -46,8 +46,9 @@ def install() -> None:
 
 
 def report_unraisable(lost: sys.UnraisableHookArgs) -> None:
-    """Hook for exceptions that cannot be raised: as Python's, but silent about an interruption, which is repeated."""
-    if not (_requested and issubclass(lost.exc_type, KeyboardInterrupt)):
+    """Hook for exceptions that cannot be raised: as Python's, but silent once an end was asked for: the interruption is
+    repeated, and finalizers of what it left half made fail."""
+    if not _requested:
         sys.__unraisablehook__(lost)
 
 

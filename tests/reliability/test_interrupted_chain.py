@@ -69,3 +69,28 @@ def test_a_step_whose_chain_is_gone_does_not_begin(monkeypatch: pytest.MonkeyPat
     interruption.end_with_parent()
     monkeypatch.setenv(interruption.PARENT_VARIABLE, "not a number")
     interruption.end_with_parent()
+
+
+HALF_MADE = """
+import os, signal
+from scenewright.stages.engine import interruption
+
+class HalfMade:
+    def __del__(self):
+        self.handle.close()
+
+interruption.install()
+if {interrupted}:
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+    except KeyboardInterrupt:
+        pass
+HalfMade()
+"""
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_a_finalizer_of_what_an_interruption_left_half_made_is_silent(interrupted: bool) -> None:
+    command = [sys.executable, "-c", HALF_MADE.format(interrupted=interrupted)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stderr
+    assert ("AttributeError" in said) != interrupted
