@@ -57,7 +57,10 @@ def test_the_usual_arm_packs_as_it_ever_did(tmp_path: Path) -> None:
     packed = pack(tmp_path / "again", suite="hard/obstacles", instance=2)
     assert packed.info == PackingFile.read(golden / "packing.json")
     assert packed.path("plan.txt").read_text() == (golden / "plan.txt").read_text()
-    with np.load(golden / "trajectory.npz") as old, np.load(tmp_path / "again" / "trajectory.npz") as new:
+    with (
+        np.load(golden / "trajectory.npz", allow_pickle=False) as old,
+        np.load(tmp_path / "again" / "trajectory.npz", allow_pickle=False) as new,
+    ):
         np.testing.assert_array_equal(new["action"], old["action"])
         np.testing.assert_allclose(new["joints"], old["joints"], atol=1e-9)
 
@@ -65,7 +68,7 @@ def test_the_usual_arm_packs_as_it_ever_did(tmp_path: Path) -> None:
 def test_another_arm_packs_the_same_problem(tmp_path: Path) -> None:
     packed = pack(tmp_path / "a", suite="published/easy", robot="xarm7")
     assert packed.outcome == "ok" and packed.info.robot == "xarm7"
-    with np.load(tmp_path / "a" / "trajectory.npz") as arrays:
+    with np.load(tmp_path / "a" / "trajectory.npz", allow_pickle=False) as arrays:
         assert arrays["joints"].shape == (len(arrays["action"]), 7) and len(arrays["action"]) > 50
 
 
