@@ -370,7 +370,7 @@ ROWS = [
             f"{SEGMENT} --backend geometric" if then == "geometric" else f"{DETECTING} {then}",
             code=code,
             given=detectors,
-            right=labelled("geometric" if then == "geometric" else "detector yolox"),
+            right=labelled("geometry alone" if then == "geometric" else "detector yolox"),
         )
         for path, says, first, then, code in (
             (DETECTOR, "needs the weights of a detector", "", "--weights yolox.onnx", 5),
@@ -411,7 +411,7 @@ ROWS = [
         "segment --sequence {walks}/colourless --out out --backend {service}",
         "segment --sequence {walks}/colourless --out out --backend geometric",
         code=3,
-        right=labelled("geometric"),
+        right=labelled("geometry alone"),
     ),
     Tried(
         SERVICE,
