@@ -131,7 +131,10 @@ def name_of(said: Said, rates: Rates, extent: float, vocabulary: Vocabulary, unn
 
 
 def prior_odds(class_name: str) -> float:
-    """Return how much likelier a thing of a possible extent has the name than none, before anybody said anything."""
+    """Return how much likelier a thing of a possible extent has the name than none, before anybody said anything.
+
+    Ours: the ratio of annotated counts, times that of the widths over which extents of either are spread evenly.
+    """
     counts, largest = class_counts(), LARGEST_EXTENT.get(class_name)
     smallest = SMALLEST_EXTENT.get(class_name)
     spread = USUAL_SPREAD if largest is None or smallest is None else float(np.log(largest / smallest))
