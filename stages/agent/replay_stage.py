@@ -11,11 +11,12 @@ from scenewright.stages.agent.arms.registry import ARMS
 from scenewright.stages.agent.brains.open_loop import OpenLoopBrain
 from scenewright.stages.agent.episodes import RecordedBrain, write_episode
 from scenewright.stages.agent.parameters import ReplayParameters
-from scenewright.stages.agent.segmenter_identity import identity_of
 from scenewright.stages.agent.session import Limits
 from scenewright.stages.agent.tasks import TASKS
 from scenewright.stages.agent.trials import Setting, goals_of
 from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.kit.acting.errors import segmenter_rates
+from scenewright.stages.kit.acting.eyes.identity import identity_of
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.stage import Context
 
@@ -42,7 +43,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         episode.apartment,
         file.words,
         task.goals if task else goals_of(file.words),
-        Rates().scaled(file.failures, file.perception),
+        Rates(segmenter_rates(file.segmenter_errors)).scaled(file.failures, file.perception),
         file.seed,
         Limits(turns=file.most_turns),
         world=file.simulation,
@@ -63,6 +64,7 @@ def run(episode: AgentEpisode, *, parameters: ReplayParameters, context: Context
         label=file.brain,
         width=parameters.image_width,
         segmenter=identity,
+        segmenter_errors=file.segmenter_errors,
         robot=name,
     )
     if episode.path("transcript.jsonl").is_file():

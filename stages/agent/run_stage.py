@@ -14,12 +14,13 @@ from scenewright.stages.agent.brains.brain import Brain
 from scenewright.stages.agent.brains.language import LanguageBrain
 from scenewright.stages.agent.episodes import write_episode
 from scenewright.stages.agent.parameters import RunParameters
-from scenewright.stages.agent.segmenter_identity import identity_of
 from scenewright.stages.agent.session import Limits
 from scenewright.stages.agent.tasks import TASKS, make_apartment, make_household
 from scenewright.stages.agent.trials import Setting, goals_of, rules_brain
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.reconstructed import apartment_of
+from scenewright.stages.kit.acting.errors import segmenter_rates
+from scenewright.stages.kit.acting.eyes.identity import identity_of
 from scenewright.stages.kit.language.chat import Chat
 from scenewright.stages.kit.language.opening import open_chat
 from scenewright.stages.kit.language.scripted import ScriptedBackend
@@ -54,7 +55,7 @@ def run(
         apartment,
         words,
         task.goals if task else goals_of(words),
-        Rates().scaled(parameters.failures, parameters.perception),
+        Rates(segmenter_rates(parameters.segmenter_errors)).scaled(parameters.failures, parameters.perception),
         context.seed,
         Limits(turns=parameters.turns),
         world=parameters.simulation,
@@ -80,6 +81,7 @@ def run(
             label=brain.label,
             width=parameters.image_width,
             segmenter=identity_of(parameters.segmenter),
+            segmenter_errors=parameters.segmenter_errors,
             robot=load_robot(parameters.robot).name if parameters.simulation == "physics" else USUAL_ROBOT,
         )
 

@@ -11,7 +11,7 @@ from scenewright.stages.agent.body import Body
 from scenewright.stages.agent.goals import BOXES, CARRIERS, SMALL
 from scenewright.stages.agent.language.values import ObjectMap, SceneObject
 from scenewright.stages.agent.senses import Base, Detection, Position, SeenFurniture, Sweep
-from scenewright.stages.kit.rendering.segmenter_errors import quarter_turn
+from scenewright.stages.kit.acting.errors import quarter_turn
 
 SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
@@ -101,6 +101,11 @@ class Item:
         return sum(1 if used else -1 for used in self.used_votes.values())
 
 
+ENOUGH = 2
+"""Regions of views by which a class has to be ahead before anything is done about it: what is wrong from two is mostly
+wrong for good (data/errors/segmenters.toml), and a third region is mostly a drive away."""
+
+
 class SceneMap:
     """Furniture and things by key, names given in the order in which they were found."""
 
@@ -111,7 +116,7 @@ class SceneMap:
         self.items: dict[str, Item] = {}
         self.obstacles = body.obstacles
         self._named: Counter[str] = Counter()
-        self._same_thing, self._enough = body.same_thing, body.enough
+        self._same_thing = body.same_thing
 
     def know(self, before: Mapped) -> None:
         """Believe in what somebody mapped before, the things as if one view had shown them."""
@@ -220,7 +225,7 @@ class SceneMap:
             piece = self.furniture[key]
             return SceneObject(key, piece.label, door=piece.door, opened=piece.opened)
         item = self.items[key]
-        doubt, ahead = (item.doubt, min(item.margin, self._enough)) if self.careful else ("", 0)
+        doubt, ahead = (item.doubt, min(item.margin, ENOUGH)) if self.careful else ("", 0)
         on = self.carrier_of(item)
         return SceneObject(key, item.label, item.place, item.color, item.used, on=on, doubt=doubt, ahead=ahead)
 

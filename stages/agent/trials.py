@@ -14,14 +14,14 @@ from scenewright.stages.agent.brains.open_loop import OpenLoopBrain
 from scenewright.stages.agent.brains.rules import RulesBrain
 from scenewright.stages.agent.brains.slips import Slips
 from scenewright.stages.agent.brains.words import NotUnderstood, understood
-from scenewright.stages.agent.goals import Goal, sought
+from scenewright.stages.agent.goals import FURNITURE, THINGS, Goal, sought
 from scenewright.stages.agent.session import Limits, Session, Turn, run_session
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.fast import FastWorld
 from scenewright.stages.agent.world.floor import Floor
 from scenewright.stages.agent.world.reconstructed import mapped
 from scenewright.stages.agent.world.truth import World
-from scenewright.stages.kit.rendering.segmenter_errors import Luck
+from scenewright.stages.kit.acting.errors import Luck
 from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 WorldName = Literal["fast", "physics"]
@@ -68,9 +68,9 @@ def open_world(setting: Setting, arm: str) -> World:
 
         segmenter = None
         if setting.segmenter:
-            from scenewright.stages.agent.world.physics.asked import AskedSegmenter
+            from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter
 
-            segmenter = AskedSegmenter(setting.segmenter, setting.seed)
+            segmenter = AskedSegmenter(setting.segmenter, setting.seed, (*THINGS, *FURNITURE))
         return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed, segmenter, setting.robot)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 

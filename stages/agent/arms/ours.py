@@ -21,7 +21,7 @@ from scenewright.stages.agent.body import Body
 from scenewright.stages.agent.exploration import explore
 from scenewright.stages.agent.goals import CARRIERS
 from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
-from scenewright.stages.agent.scene_map import Item, Region, classes_not_of, quarter
+from scenewright.stages.agent.scene_map import ENOUGH, Item, Region, classes_not_of, quarter
 from scenewright.stages.agent.senses import Base, Detection, Position
 
 SURE_OF_USE = 2
@@ -188,7 +188,7 @@ class OwnSkills(CommonSkills):
         model all others tell equally much, so that the next is the cheapest from where it was not seen yet: from near
         by wherever the arm gets there, else from another side."""
         for _ in range(MOST_VIEWS):
-            if item.margin >= self._body.enough or item.key not in self.scene.items:
+            if item.margin >= ENOUGH or item.key not in self.scene.items:
                 return
             viewpoint = self._near_by(item)
             if viewpoint is not None and self._there(viewpoint, item.place):

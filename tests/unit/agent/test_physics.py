@@ -24,7 +24,6 @@ from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.kinematics import forward
-from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 from scenewright.stages.kit.simulation.robot_description import load_robot
 
 JAWS = Jaws(0.08, (0.105, 0.033), 0.008)
@@ -47,7 +46,7 @@ ABOVE = (2.0, 2.4, 0.74)
 class PhysicsBodyStub:
     """As much of a body as a map asks for."""
 
-    base, same_thing, enough = Base(0.0, -1.0, 0.0), 0.07, 2
+    base, same_thing = Base(0.0, -1.0, 0.0), 0.07
     obstacles = ObstacleMap(base, 2.9)
 
 
@@ -194,17 +193,6 @@ def test_a_few_grasps_of_each_steepness_and_none_from_behind() -> None:
     steep = [round(float(g[2, 2]), 1) for g in grasps]
     assert steep == sorted(steep) and max(steep.count(p) for p in set(steep)) <= 8 and len(set(steep)) == 3
     assert all(g[0, 2] > 0 for g in grasps if g[2, 2] > -0.99)
-
-
-def test_errors_of_a_segmenter_persist_and_name_what_was_asked_for() -> None:
-    errors = SegmenterErrors(SegmenterRates(confusable=1.0, confused=0.5, missed=0.3), Luck(1), ("apple", "plate"))
-    regions = [(side, near) for side in range(4) for near in (False, True)]
-    labels = [errors.class_of("can_0", "can", *region) for region in regions]
-    assert labels == [errors.class_of("can_0", "can", *region) for region in regions]
-    assert len(set(labels)) == 2 and set(labels) < {"can", "apple", "plate"}
-    missed = [errors.misses(f"can_{k}", 0, 1, False) for k in range(400)]
-    assert 0.2 < np.mean(missed) < 0.4
-    assert not SegmenterErrors(SegmenterRates(0, 0, 0, 0), Luck(1), ("apple",)).misses("can_0", 0, 1, False)
 
 
 def test_a_way_goes_around_what_is_known() -> None:

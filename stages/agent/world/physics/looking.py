@@ -6,28 +6,20 @@ from itertools import product
 from math import atan2, cos, pi, sin
 
 import numpy as np
+from scenewright.stages.agent.goals import FURNITURE
 from scenewright.stages.agent.scene_map import quarter
 from scenewright.stages.agent.senses import Base, Detection, Look, Position, Sweep
 from scenewright.stages.agent.world.physics import head
-from scenewright.stages.agent.world.physics.eyes import (
-    HEAD,
-    NEAR_BY,
-    STAINED,
-    WRIST,
-    Mask,
-    Segmenter,
-    Surface,
-    fuse,
-    seen_in,
-)
+from scenewright.stages.agent.world.physics.eyes import HEAD, NEAR_BY, STAINED, WRIST, Surface, fuse, seen_in
 from scenewright.stages.agent.world.physics.fronts import PARTS, Front
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
 from scenewright.stages.agent.world.physics.seen import FOUND_WITHIN, Seen
+from scenewright.stages.kit.acting.eyes.masks import Mask, Segmenter
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
-from scenewright.stages.kit.rendering.object_views import take
+from scenewright.stages.kit.rendering.object_views import Picture, take
 
 SIDEWAYS = (0.0, -0.5, 0.5)
 """Turns of the first joint for the three wrist poses [rad]."""
@@ -51,6 +43,8 @@ class Looking:
         self._view = looking_arm(robot.beliefs)
         self.looked_near: tuple[Base, Position] | None = None
         """From where it looked last from near by, and at what."""
+        self._missed: set[str] = set()
+        """What pictures of this look showed that is not among their masks, as far as somebody knows."""
         self.pictures: list[tuple[str, np.ndarray]] = []
         """What the wrist camera took last, for people."""
 
@@ -70,7 +64,8 @@ class Looking:
                 head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points) & ~self._seen.of_parts(points)
             )
             clouds.append(points[is_steady])
-            for entry in self._segmenter.furniture(picture, map_from_true @ pose):
+            masks = self._segmenter.masks(picture, map_from_true @ pose, ("head", turn))
+            for entry in [mask for mask in masks if mask.label in FURNITURE]:
                 of_furniture = is_steady & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
                 if of_furniture.sum() >= head.LEAST:
                     head.enter(self._seen.pieces, entry.label, points[of_furniture])
@@ -111,7 +106,7 @@ class Looking:
             front = self._seen.front_of(piece)
             if front is not None:
                 self._seen.keep_floor(picture, camera, front)
-            masks = self._segmenter.masks(picture, camera, (sector, close))
+            masks = self._masks(picture, camera, (sector, close))
             surfaces += seen_in(picture, _things(masks), camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
@@ -122,12 +117,17 @@ class Looking:
         self._seen.keep(surfaces_near, at, piece, close)
         return Look(tuple(self._detection(s, sector, close, at) for s in surfaces_near), sector, close)
 
+    def _masks(self, picture: Picture, camera: np.ndarray, region: object) -> list[Mask]:
+        masks = self._segmenter.masks(picture, camera, region)
+        self._missed |= self._segmenter.missed
+        return masks
+
     def _count_missed(self) -> None:
-        for name in sorted(self._segmenter.missed):
+        for name in sorted(self._missed):
             sought_thing = self._robot.room.things.get(name)
             if sought_thing is None or sought_thing.label in self._sought:
                 self._robot.log.mistaken("missed", f"look {name}")
-        self._segmenter.missed.clear()
+        self._missed.clear()
 
     def look_at_front(self, at: Position, *, close: bool = False) -> list[Surface]:
         """Look at a front from before it, to both sides of a position, or there at twice the resolution: handles, and
@@ -138,7 +138,7 @@ class Looking:
             pose, camera = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
             picture = take(renderer, NEAR_BY if close else WRIST, pose, self._robot.random)
-            masks = [m for m in self._segmenter.masks(picture, camera, (sector, close)) if m.label in PARTS]
+            masks = [mask for mask in self._masks(picture, camera, (sector, close)) if mask.label in PARTS]
             surfaces += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"front {arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
@@ -240,5 +240,5 @@ def is_thing(surface: Surface) -> bool:
 
 
 def _things(masks: list[Mask]) -> list[Mask]:
-    """Return the masks without those of what moves of furniture."""
-    return [entry for entry in masks if entry.label not in PARTS]
+    """Return the masks without those of furniture and of what moves of it."""
+    return [entry for entry in masks if entry.label not in (*PARTS, *FURNITURE)]
