@@ -1,0 +1,62 @@
+"""Any scene as a folder that the physics of this toolkit loads: ours as it is, others written anew beside the fact."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenewright.schemas.errors import BadInput
+from scenewright.stages.library.importing.limits import told_refusals
+from scenewright.stages.library.importing.scenes.mjcf_scene import mjcf_scene
+from scenewright.stages.library.importing.scenes.sdf_scene import sdf_scene
+from scenewright.stages.library.importing.scenes.urdf_scene import urdf_scene
+from scenewright.stages.library.importing.scenes.writing import OthersScene, write_scene
+from scenewright.stages.library.importing.source_folder import SourceFolder
+
+READERS: dict[str, Callable[[Path], OthersScene]] = {
+    "robot": urdf_scene,
+    "mujoco": mjcf_scene,
+    "sdf": sdf_scene,
+    "gazebo": sdf_scene,
+}
+"""Root element -> reader."""
+USD = (".usd", ".usda", ".usdc", ".usdz")
+WHAT_IS_READ = "name a folder with scene.json, or a URDF, MJCF or SDF file"
+
+
+@dataclass(frozen=True)
+class OpenedScene:
+    """A scene that can be loaded."""
+
+    folder: Path
+    """With scene.json, bodies and scene.mjcf.xml."""
+    others: OthersScene | None = None
+    """What was read of another's file; None for a folder of ours."""
+
+
+@contextmanager
+def opened_scene(path: Path) -> Iterator[OpenedScene]:
+    """Open a scene folder of ours, or a URDF, MJCF or SDF file, for as long as the block lasts.
+
+    Raises BadInput for what is none of these, and for what the file's reader refuses.
+    """
+    if path.is_dir():
+        if not (path / "scene.json").is_file():
+            raise BadInput(f"{path}: there is no scene.json in it", hint=WHAT_IS_READ)
+        yield OpenedScene(path)
+        return
+    if not path.is_file():
+        raise BadInput(f"{path}: there is no such file or folder", hint=WHAT_IS_READ)
+    if path.suffix.lower() in USD:
+        raise BadInput(f"{path}: USD is not read", hint=WHAT_IS_READ)
+    tag = SourceFolder(path.parent).read_xml(path).tag
+    if tag not in READERS:
+        raise BadInput(f"{path}: root element is <{tag:.40}>", hint=WHAT_IS_READ)
+    with tempfile.TemporaryDirectory() as folder:
+        with told_refusals(str(path)):
+            scene = READERS[tag](path)
+            write_scene(Path(folder), scene)
+        yield OpenedScene(Path(folder), scene)

@@ -1,0 +1,121 @@
+"""A scene that others wrote as a folder of ours: scene.json, a URDF a body, and the whole for MuJoCo."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scenewright.schemas.base import as_transform
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from scenewright.stages.kit.formats.mjcf_file import write_mjcf
+from scenewright.stages.kit.formats.model_writer import write_obj
+from scenewright.stages.kit.formats.urdf_check import check_urdf
+from scenewright.stages.kit.formats.urdf_file import Link, Urdf, UrdfJoint, write_urdf
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.solids import MassProperties
+from scenewright.stages.kit.geometry.transforms import apply
+from scenewright.stages.library.importing.scenes.bodies import OthersBody
+from scenewright.stages.library.importing.scenes.shapes import Hulls
+
+SceneFormat = Literal["URDF", "MJCF", "SDF"]
+WORLD = "world"
+
+
+@dataclass(frozen=True)
+class OthersScene:
+    """A scene as its file has it."""
+
+    path: Path
+    format: SceneFormat
+    bodies: tuple[OthersBody, ...]
+    hulls: Hulls
+    joint_values: dict[str, float] = field(default_factory=dict)
+    """Joint -> value [rad, m] at the start; absent: 0, or the limit nearest to it."""
+    grounds: frozenset[str] = frozenset()
+    """Bodies with a plane."""
+    numbers: dict[str, int] = field(default_factory=dict)
+    """Free body -> its number in MuJoCo, of an MJCF."""
+    findings: tuple[str, ...] = ()
+    """What was left out, or taken as something else."""
+
+
+class PlainNames:
+    """Names that URDF allows, each given once."""
+
+    def __init__(self) -> None:
+        self._given = {WORLD}
+
+    def of(self, name: str) -> str:
+        """Return the name with other characters as `_`, and a number after it where it was given before."""
+        plain = re.sub(r"[^A-Za-z0-9_.\-]+", "_", name)[:150].lstrip(".-") or "body"
+        unique, number = plain, 1
+        while unique in self._given:
+            number += 1
+            unique = f"{plain}_{number}"
+        self._given.add(unique)
+        return unique
+
+
+def write_scene(folder: Path, scene: OthersScene) -> None:
+    """Write scene.json, static.urdf, a URDF a body, its hulls, and scene.mjcf.xml into an empty folder.
+
+    Raises BadInput, which names the scene's own file, for a body that no engine takes.
+    """
+    values = {
+        joint.name: scene.joint_values.get(joint.name, _closed(joint)) for body in scene.bodies for joint in body.joints
+    }
+    (folder / "meshes").mkdir()
+    for file, solid in scene.hulls.solids.items():
+        write_obj(folder / file, solid.vertices, solid.faces)
+    write_urdf(folder / "static.urdf", Urdf(WORLD, (Link(WORLD),)))
+    for body in scene.bodies:
+        write_urdf(folder / f"{body.name}.urdf", Urdf(body.name, _whole(body), body.joints))
+        if problems := check_urdf(folder / f"{body.name}.urdf"):
+            raise BadInput(f"{scene.path}: body {body.name}: {problems[0]}", hint="mend it")
+    records = tuple(_record(body, scene, values) for body in scene.bodies)
+    InteractiveSceneFile(static_file="static.urdf", bodies=records).write(folder / "scene.json")
+    write_mjcf(folder / "scene.mjcf.xml", _tree(scene.bodies), values)
+
+
+def _closed(joint: UrdfJoint) -> float:
+    """Return 0, or the limit nearest to it."""
+    return 0.0 if joint.type == "continuous" else min(max(0.0, joint.lower), joint.upper)
+
+
+def _whole(body: OthersBody) -> tuple[Link, ...]:
+    """Return the links; the first of what stands fast needs no mass, and loaders want one."""
+    first = body.links[0]
+    if body.free or (first.inertial is not None and first.inertial.mass > 0):
+        return body.links
+    return replace(first, inertial=MassProperties(1.0, np.zeros(3), np.eye(3))), *body.links[1:]
+
+
+def _record(body: OthersBody, scene: OthersScene, values: dict[str, float]) -> SceneBody:
+    corners = np.concatenate([scene.hulls.bounds(shape) for link in body.links[:1] for shape in link.collisions] or [[]])
+    placed = apply(body.world_from_body, corners.reshape(-1, 3)) if corners.size else body.world_from_body[:3, 3][None]
+    return SceneBody(
+        name=body.name,
+        class_name="floor" if body.name in scene.grounds else "object",
+        movable=body.free,
+        file=f"{body.name}.urdf",
+        world_from_body=as_transform(body.world_from_body),
+        joint_values={joint.name: values[joint.name] for joint in body.joints},
+        box=box_from_bounds(placed.min(axis=0), placed.max(axis=0)),
+        mass=sum(link.inertial.mass for link in body.links if link.inertial is not None),
+    )
+
+
+def _tree(bodies: Iterable[OthersBody]) -> Urdf:
+    """Return all bodies below the world."""
+    links, joints = [Link(WORLD)], []
+    for body in bodies:
+        kind = "floating" if body.free else "fixed"
+        joints.append(UrdfJoint(f"{body.name}__in_the_world", kind, WORLD, body.name, body.world_from_body))
+        links += body.links
+        joints += body.joints
+    return Urdf("scene", tuple(links), tuple(joints))
