@@ -274,7 +274,8 @@ def frame_of_axis(tree: SdfTree, joint: Frame, axis: ElementTree.Element) -> np.
     if in_model and joint.scope.version >= NO_PARENT_MODEL_FRAME:
         in_model = False
         tree.findings.append(
-            f"joint {joint.name!r:.40}: use_parent_model_frame means nothing since SDF 1.7: its axis is in its own frame"
+            f"joint {joint.name!r:.40}: use_parent_model_frame means nothing since SDF 1.7: its axis is in its own"
+            " frame"
         )
     if not name and not in_model and joint.scope.version >= AXES_IN_JOINT_FRAMES:
         return tree.pose(joint)

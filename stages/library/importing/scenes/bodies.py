@@ -1,8 +1,9 @@
 """A whole kinematic tree as bodies: what is free, what stands fast, and what moves on joints in either.
 
-A link that hangs on another by a floating joint is the first of a free body. A link that hangs on the world by a fixed
-joint is the first of a body that stands fast; in URDF and MJCF, where a table hangs on its floor, so is one that is fixed
-to what stands fast. What hangs on these by other joints belongs to them; what is fixed to a part that moves is one with it.
+A link that hangs on another by a floating joint is the first of a free body. A link that hangs on the world by a
+fixed joint is the first of a body that stands fast; in URDF and MJCF, where a table hangs on its floor, so is one that
+is fixed to what stands fast. What hangs on these by other joints belongs to them; what is fixed to a part that moves is
+one with it.
 """
 
 from __future__ import annotations

@@ -19,11 +19,13 @@ from scenewright.stages.library.importing.mjcf_document import MjcfDocument
 from scenewright.stages.library.importing.scenes.bodies import bodies_of
 from scenewright.stages.library.importing.scenes.sdf_scene import check_gravity
 from scenewright.stages.library.importing.scenes.shapes import Hulls, ground_shape, solid_shape
-from scenewright.stages.library.importing.scenes.writing import WORLD, OthersScene, PlainNames
+from scenewright.stages.library.importing.scenes.writing import OthersScene, PlainNames
 from scenewright.stages.library.importing.source_folder import SourceFolder
 
 FOLDERS = {"mesh": "meshdir", "texture": "texturedir", "hfield": "meshdir", "skin": "meshdir"}
 """Elements that name files -> attribute of <compiler> with the folder."""
+LEVEL = 0.999
+"""A plane is level when the part of its normal along z is larger."""
 KINDS = {"hinge": "revolute", "slide": "prismatic"}
 
 
@@ -71,8 +73,8 @@ class _Reader:
         mujoco.mj_forward(model, self.data)
         self.findings: list[str] = []
         self.hulls = Hulls()
-        plain = PlainNames()
-        self.names = [WORLD]
+        self.plain = plain = PlainNames()
+        self.names = [plain.of("worldbody")]
         self.names += [plain.of(model.body(k).name or f"body_{k}") for k in range(1, model.nbody)]
         self.joint_names = [plain.of(model.joint(k).name or f"joint_{k}") for k in range(model.njnt)]
         self.joints: list[UrdfJoint] = []
@@ -86,7 +88,7 @@ class _Reader:
         check_gravity(np.array(model.opt.gravity), str(self.path), self.findings)
         for number in range(1, model.nbody):
             self._hang(number)
-        links = tuple(self._link(number) for number in range(model.nbody))
+        links = tuple([self._link(number) for number in range(model.nbody)] + self._grounds())
         self._say_what_bullet_lacks()
         bodies = bodies_of(Urdf("", links, tuple(self.joints)), self.values, str(self.path))
         numbers = {body.name: self.names.index(body.name) for body in bodies if body.free}
@@ -106,10 +108,11 @@ class _Reader:
         model, mujoco = self.model, self.mujoco
         name, parent = self.names[number], int(model.body_parentid[number])
         first, count = int(model.body_jntadr[number]), int(model.body_jntnum[number])
-        kinds = [mujoco.mjtJoint(model.jnt_type[k]).name.removeprefix("mjJNT_").lower() for k in range(first, first + count)]
+        types = [mujoco.mjtJoint(model.jnt_type[k]).name for k in range(first, first + count)]
+        kinds = [name.removeprefix("mjJNT_").lower() for name in types]
         if kinds == ["free"]:
             world_from_body = _frame(self.data.xpos[number], self.data.xmat[number])
-            self.joints.append(UrdfJoint(f"{name}__in_the_world", "floating", WORLD, name, world_from_body))
+            self.joints.append(UrdfJoint(f"{name}__in_the_world", "floating", self.names[0], name, world_from_body))
             return
         parent_from_body = _frame(model.body_pos[number], quaternion=model.body_quat[number])
         moving = [k for k, kind in zip(range(first, first + count), kinds, strict=True) if kind in KINDS]
@@ -152,6 +155,8 @@ class _Reader:
         model, own_from_body = self.model, inverse(self.frames[number])
         shapes, frictions = [], []
         for geom in range(model.ngeom):
+            if self._is_plane(geom):
+                continue
             if model.geom_bodyid[geom] == number and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
                 shape = self._shape(geom, own_from_body)
                 shapes += [] if shape is None else [shape]
@@ -164,14 +169,30 @@ class _Reader:
             inertial = MassProperties(mass, frame[:3, 3], tensor)
         return Link(self.names[number], inertial, (), tuple(shapes), max(frictions, default=None))
 
+    def _grounds(self) -> list[Link]:
+        """Return each plane as a link of its own that is fixed to its body: under a level one nothing may end."""
+        model, links = self.model, []
+        for geom in range(model.ngeom):
+            if not self._is_plane(geom) or not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+                continue
+            name, body = self.plain.of(model.geom(geom).name or "ground"), int(model.geom_bodyid[geom])
+            pose = _frame(model.geom_pos[geom], quaternion=model.geom_quat[geom])
+            friction = float(model.geom_friction[geom][0])
+            links.append(Link(name, None, (), (ground_shape(np.eye(4)),), friction))
+            pose = inverse(self.frames[body]) @ pose
+            self.joints.append(UrdfJoint(f"{name}__fixed", "fixed", self.names[body], name, pose))
+            if self.data.geom_xmat[geom][8] > LEVEL:
+                self.grounds.add(name)
+        return links
+
+    def _is_plane(self, geom: int) -> bool:
+        return int(self.model.geom_type[geom]) == int(self.mujoco.mjtGeom.mjGEOM_PLANE)
+
     def _shape(self, geom: int, own_from_body: np.ndarray) -> Shape | None:
         model, where = self.model, f"{self.path}: geom {self.model.geom(geom).name or geom!r}"
         kind = self.mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
         pose = own_from_body @ _frame(model.geom_pos[geom], quaternion=model.geom_quat[geom])
         size = np.array(model.geom_size[geom])
-        if kind == "plane":
-            self.grounds.add(self.names[int(model.geom_bodyid[geom])])
-            return ground_shape(pose)
         if kind == "box":
             return solid_shape("box", 2 * size, pose, where)
         if kind in ("sphere", "cylinder", "capsule"):
@@ -195,6 +216,8 @@ class _Reader:
         masks = {
             (int(a), int(b)) for a, b in zip(model.geom_contype, model.geom_conaffinity, strict=True) if a or b
         } - {(1, 1)}
+        if (model.body_gravcomp != 0).any():
+            self.findings.append(f"{int((model.body_gravcomp != 0).sum())} bodies have gravcomp: taken as 0")
         for count, what in (
             (int(model.neq), "<equality> hold"),
             (int(model.ntendon), "<tendon> pull"),

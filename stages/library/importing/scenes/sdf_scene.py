@@ -178,6 +178,8 @@ class _Reader:
     def _link(self, frame: Frame) -> Link:
         own_from_link = inverse(self.frames[frame]) @ self.tree.pose(frame)
         shapes = [s for child in frame.element.findall("collision") for s in self._shapes(child, frame, own_from_link)]
+        if (frame.element.findtext("gravity") or "1").strip() in ("0", "false"):
+            self.findings.append(f"link {frame.name!r:.40} is without gravity in its file: here it falls")
         told = frame.element.findtext("collision/surface/friction/ode/mu")
         friction = FRICTION if told is None else float(numbers(told, 1, f"{frame.where}: mu")[0])
         inertial = self._inertial(frame, own_from_link)
@@ -185,9 +187,8 @@ class _Reader:
 
     def _inertial(self, frame: Frame, own_from_link: np.ndarray) -> MassProperties:
         element = frame.element.find("inertial")
-        if element is None or element.find("mass") is None:
-            if not self._is_static(frame.scope):
-                self.findings.append(f"link {frame.name!r:.40} has no mass: SDF takes 1 kg and 1 kg m^2")
+        if (element is None or element.find("mass") is None) and not self._is_static(frame.scope):
+            self.findings.append(f"link {frame.name!r:.40} has no mass: SDF takes 1 kg and 1 kg m^2")
         if element is None:
             element = ElementTree.Element("inertial")
         mass = float(numbers(element.findtext("mass") or "1", 1, f"{frame.where}: mass")[0])
@@ -217,7 +218,8 @@ class _Reader:
                 sizes = np.concatenate([numbers(solid.findtext(key), count, f"{where}: {kind} {key}") for key in keys])
                 return [solid_shape(kind, sizes, pose, where)]
         if (plane := geometry.find("plane")) is not None:
-            self.grounds.add(self.names[link])
+            if len(link.element.findall("collision")) == 1:
+                self.grounds.add(self.names[link])
             normal = numbers(plane.findtext("normal") or "0 0 1", 3, f"{where}: plane normal")
             turn = rotation_between(np.array([0.0, 0.0, 1.0]), np.array(unit_axis(normal, where)))
             return [ground_shape(pose @ transform_from(turn, np.zeros(3)))]

@@ -96,8 +96,8 @@ def _whole(body: OthersBody) -> tuple[Link, ...]:
 
 
 def _record(body: OthersBody, scene: OthersScene, values: dict[str, float]) -> SceneBody:
-    corners = np.concatenate([scene.hulls.bounds(shape) for link in body.links[:1] for shape in link.collisions] or [[]])
-    placed = apply(body.world_from_body, corners.reshape(-1, 3)) if corners.size else body.world_from_body[:3, 3][None]
+    corners = [scene.hulls.bounds(shape) for shape in body.links[0].collisions]
+    placed = apply(body.world_from_body, np.concatenate(corners or [np.zeros((1, 3))]))
     return SceneBody(
         name=body.name,
         class_name="floor" if body.name in scene.grounds else "object",
