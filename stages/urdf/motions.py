@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -10,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 MOVED_LIMIT = 0.01
 """A movable body that moves further has not stayed [m]."""
-TURNED_LIMIT = np.radians(2.0)
+TURNED_LIMIT = math.radians(2.0)
 """A movable body that turns further has not stayed [rad]."""
 WATCHED = 0.05
 """How often is looked at what was let go [s]."""

@@ -33,11 +33,14 @@ def mjcf_scene(path: Path) -> OthersScene:
     """Read an MJCF as a scene. Raises BadInput, and MissingDependency without MuJoCo."""
     mujoco = _mujoco()
     _check_files(path)
+    mujoco.set_mju_user_warning(lambda text: None)  # else into a file where it runs
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         reason = plain_text(str(error).strip(), 200)
         raise BadInput(f"{path}: MuJoCo does not read it: {reason}", hint="mend what MuJoCo names") from None
+    finally:
+        mujoco.set_mju_user_warning(None)
     return _Reader(path, mujoco, model).scene()
 
 

@@ -51,7 +51,7 @@ def opened_scene(path: Path) -> Iterator[OpenedScene]:
     if not path.is_file():
         raise BadInput(f"{path}: there is no such file or folder", hint=WHAT_IS_READ)
     if path.suffix.lower() in USD:
-        raise BadInput(f"{path}: USD is not read", hint=WHAT_IS_READ)
+        raise BadInput(f"{path}: USD is not read: MuJoCo as it is installed has no decoder for it", hint=WHAT_IS_READ)
     tag = SourceFolder(path.parent).read_xml(path).tag
     if tag not in READERS:
         raise BadInput(f"{path}: root element is <{tag:.40}>", hint=WHAT_IS_READ)

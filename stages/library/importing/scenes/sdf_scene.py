@@ -3,6 +3,7 @@ ties to the world, stands fast. SDF knows no joint values: links stand where the
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -52,8 +53,11 @@ class _Reader:
         self.tree = SdfTree(self.folder, self.findings)
         self.tree.add(Scope("", path, sdf_version(self.root), worlds[0] if worlds else self.root))
         self.plain = PlainNames()
+        told = [*self.tree.links, *self.tree.joints]
+        self.alone = {name for name, count in Counter(map(_last, told)).items() if count == 1}
+        """Names without those of models that only one link or joint has."""
         self.names = {link: self.plain.of(self._short(link)) for link in self.tree.links}
-        self.joint_names = {joint: self.plain.of(joint.name) for joint in self.tree.joints}
+        self.joint_names = {joint: self.plain.of(self._told(joint)) for joint in self.tree.joints}
         self.frames = {link: self.tree.pose(link) for link in self.tree.links}
         """Frame of each link as it is written, world: that of its joint where it hangs on one."""
         self.grounds: set[str] = set()
@@ -83,7 +87,10 @@ class _Reader:
         """Return the name of its model for the first link of one, else that of the link."""
         prefix = link.scope.prefix.removesuffix("::")
         first = next(other for other in self.tree.links if other.scope.prefix == link.scope.prefix)
-        return prefix if prefix and first is link else link.name
+        return prefix if prefix and first is link else self._told(link)
+
+    def _told(self, frame: Frame) -> str:
+        return _last(frame) if _last(frame) in self.alone else frame.name
 
     def _is_static(self, scope: Scope) -> bool:
         while scope.frame is not None:
@@ -227,6 +234,11 @@ class _Reader:
         if kinds:
             self.findings.append(f"a shape of link {link.name!r:.40} is left out: {kinds}")
         return []
+
+
+def _last(frame: Frame) -> str:
+    """Return the name of a link or joint without those of the models around it."""
+    return frame.name.rpartition("::")[2]
 
 
 def check_gravity(gravity: np.ndarray, where: str, findings: list[str]) -> None:

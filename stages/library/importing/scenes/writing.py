@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -16,7 +16,7 @@ from scenewright.stages.kit.formats.mjcf_file import write_mjcf
 from scenewright.stages.kit.formats.model_writer import write_obj
 from scenewright.stages.kit.formats.urdf_check import check_urdf
 from scenewright.stages.kit.formats.urdf_file import Link, Urdf, UrdfJoint, write_urdf
-from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.boxes import box_from_bounds, points_in_box
 from scenewright.stages.kit.geometry.solids import MassProperties
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.library.importing.scenes.bodies import OthersBody
@@ -77,7 +77,7 @@ def write_scene(folder: Path, scene: OthersScene) -> None:
         write_urdf(folder / f"{body.name}.urdf", Urdf(body.name, _whole(body), body.joints))
         if problems := check_urdf(folder / f"{body.name}.urdf"):
             raise BadInput(f"{scene.path}: body {body.name}: {problems[0]}", hint="mend it")
-    records = tuple(_record(body, scene, values) for body in scene.bodies)
+    records = _with_contents([_record(body, scene, values) for body in scene.bodies])
     InteractiveSceneFile(static_file="static.urdf", bodies=records).write(folder / "scene.json")
     write_mjcf(folder / "scene.mjcf.xml", _tree(scene.bodies), values)
 
@@ -107,6 +107,22 @@ def _record(body: OthersBody, scene: OthersScene, values: dict[str, float]) -> S
         joint_values={joint.name: values[joint.name] for joint in body.joints},
         box=box_from_bounds(placed.min(axis=0), placed.max(axis=0)),
         mass=sum(link.inertial.mass for link in body.links if link.inertial is not None),
+    )
+
+
+def _with_contents(records: Sequence[SceneBody]) -> tuple[SceneBody, ...]:
+    """Return the bodies, free ones whose middle lies in the box of one with doors or drawers as what that contains: it
+    rides along when these move. No file says so."""
+    holders = sorted((body for body in records if body.joint_values), key=lambda body: float(np.prod(body.box.size)))
+
+    def holder(body: SceneBody) -> SceneBody | None:
+        middle = np.array([body.box.center])
+        return next((h for h in holders if h is not body and points_in_box(h.box, middle).all()), None)
+
+    held = {body.name: found.name for body in records if body.movable and (found := holder(body)) is not None}
+    return tuple(
+        body.model_copy(update={"parent": held[body.name], "relation": "contains"}) if body.name in held else body
+        for body in records
     )
 
 
