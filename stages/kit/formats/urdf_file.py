@@ -59,11 +59,11 @@ class Shape:
     mesh: str | None = None
     scale: float = 1.0
     box_size: tuple[float, float, float] | None = None
-    round: Primitive | None = None
-    """Of scenes that others made; `parse_urdf` keeps those that it reads apart (`Link.primitives`)."""
     link_from_shape: np.ndarray = field(default_factory=lambda: np.eye(4))
     color: tuple[float, float, float, float] | None = None
     """RGBA in 0..1; visuals only."""
+    round: Primitive | None = None
+    """Of scenes that others made; `parse_urdf` keeps those that it reads apart (`Link.primitives`)."""
 
 
 @dataclass(frozen=True)
