@@ -38,11 +38,8 @@ def urdf_protocol(
     if out is not None:
         _check_out(out)
     with opened_scene(scene) as opened:
-        others = opened.others
-        told, findings = ("scene folder", ()) if others is None else (others.format, others.findings)
-        mjcf = None if others is None or others.format != "MJCF" else others.path
-        found = protocol(opened.folder, mjcf=mjcf, numbers=None if others is None else others.numbers, seen=seen)
-        document = as_json(found, str(scene), told, findings)
+        found = protocol(opened.folder, model=opened.model, numbers=opened.numbers, seen=seen)
+        document = as_json(found, str(scene), opened.format, opened.findings)
         if out is not None:
             _write(out, opened.folder, document)
     if json_output:

@@ -57,12 +57,10 @@ def mujoco_scene(scene_folder: Path) -> MujocoScene:
     return MujocoScene(model, key, numbers, _ground(_start(model, key), model, scene))
 
 
-def mujoco_file(path: Path, numbers: Mapping[str, int], scene_folder: Path) -> MujocoScene:
-    """Load an MJCF that another wrote, in the state of its first key frame; `scene_folder` is what was read of it.
-
-    Gravity is 9.81 along -z, whatever it says. Raises as `mujoco_scene` does.
-    """
-    model = _model(path)
+def others_in_mujoco(model: Any, numbers: Mapping[str, int], scene_folder: Path) -> MujocoScene:
+    """Return what MuJoCo read of an MJCF that another wrote, in the state of its first key frame, with gravity of 9.81
+    along -z whatever the file says; `scene_folder` is the same scene for Bullet."""
+    _prepare(model)
     key = 0 if model.nkey else None
     scene = InteractiveSceneFile.read(scene_folder / "scene.json")
     tops = [top(body.box) for body in scene.bodies if body.class_name == "floor"]
@@ -124,12 +122,19 @@ def _model(path: Path) -> Any:
             model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise BadInput(f"{path}: MuJoCo does not load it: {error}", hint="run `urdf` again") from None
+    _prepare(model)
+    return model
+
+
+def _prepare(model: Any) -> None:
+    """Let gravity pull at everything, nothing sleep, and nothing begin anew."""
+    import mujoco
+
     model.opt.gravity[:] = (0.0, 0.0, -GRAVITY)
     model.body_gravcomp[:] = 0.0
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # what breaks off would seem to have stayed
     model.opt.enableflags &= ~int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0))
-    return model
 
 
 def _start(model: Any, key: int | None) -> Any:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scenewright.schemas.errors import MissingDependency
@@ -19,7 +20,7 @@ from scenewright.stages.kit.simulation.margins import RUNS
 from scenewright.stages.urdf import settle_report as settle_test
 from scenewright.stages.urdf.joint_sweep import JointRange
 from scenewright.stages.urdf.motions import MOVED_LIMIT, TURNED_LIMIT, BodyMotion
-from scenewright.stages.urdf.mujoco_settle import MJCF_FILE, MujocoScene, let_go, mujoco_file, mujoco_scene
+from scenewright.stages.urdf.mujoco_settle import MJCF_FILE, MujocoScene, let_go, mujoco_scene, others_in_mujoco
 from scenewright.stages.urdf.protocol_yield import Yield, scene_yield
 from scenewright.stages.urdf.scene_penetration import Overlap
 from scenewright.stages.urdf.settle_margins import body_is_near, body_margin, with_margins
@@ -95,10 +96,10 @@ class Protocol:
 
 
 def protocol(
-    folder: Path, *, mjcf: Path | None = None, numbers: Mapping[str, int] | None = None, seen: int | None = None
+    folder: Path, *, model: Any = None, numbers: Mapping[str, int] | None = None, seen: int | None = None
 ) -> Protocol:
-    """Run the protocol on a scene folder; `mjcf` is the file that MuJoCo reads in its place, and `numbers` says which
-    of its bodies are free. Writes nothing.
+    """Run the protocol on a scene folder; `model` is what MuJoCo runs in place of its scene.mjcf.xml, and `numbers`
+    says which of its bodies are free. Writes nothing.
 
     Raises BadInput for a scene that cannot be loaded, UsageError for a `seen` that is too small.
     """
@@ -107,9 +108,9 @@ def protocol(
     runs = {"bullet": EngineRun(library_version("pybullet"), report.bodies)}
     not_run: dict[str, str] = {}
     try:
-        if mjcf is None and not (folder / MJCF_FILE).is_file():
+        if model is None and not (folder / MJCF_FILE).is_file():
             raise MissingDependency(f"{MJCF_FILE} is not there", hint="run `urdf` again")
-        scene = mujoco_scene(folder) if mjcf is None else mujoco_file(mjcf, numbers or {}, folder)
+        scene = mujoco_scene(folder) if model is None else others_in_mujoco(model, numbers or {}, folder)
         runs["mujoco"] = EngineRun(library_version("mujoco"), _in_mujoco(scene))
     except MissingDependency as error:
         not_run["mujoco"] = f"{error.message} ({error.hint})"

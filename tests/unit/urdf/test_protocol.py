@@ -246,7 +246,7 @@ def test_unknown_elements_are_findings(file: str, tmp_path: Path, judged: Any) -
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("scene.usda", "#usda 1.0", "USD is not read"),
+        ("scene.usda", "#usda 1.0", "does not read USD"),
         ("scene.xml", "<html/>", "root element is <html>"),
         ("scene.xml", "<mujoco><worldbody><hologram/></worldbody></mujoco>", "hologram"),
         ("scene.xml", '<mujoco><option gravity="0 -9.81 0"/><worldbody/></mujoco>', "not along -z"),

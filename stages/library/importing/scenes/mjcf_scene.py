@@ -31,25 +31,44 @@ KINDS = {"hinge": "revolute", "slide": "prismatic"}
 
 def mjcf_scene(path: Path) -> OthersScene:
     """Read an MJCF as a scene. Raises BadInput, and MissingDependency without MuJoCo."""
-    mujoco = _mujoco()
+    mujoco = _mujoco("an MJCF")
     _check_files(path)
-    mujoco.set_mju_user_warning(lambda text: None)  # else into a file where it runs
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        model = _model(path, mujoco)
     except ValueError as error:
         reason = plain_text(str(error).strip(), 200)
         raise BadInput(f"{path}: MuJoCo does not read it: {reason}", hint="mend what MuJoCo names") from None
-    finally:
-        mujoco.set_mju_user_warning(None)
     return _Reader(path, mujoco, model).scene()
 
 
-def _mujoco() -> Any:
+def usd_scene(path: Path) -> OthersScene:
+    """Read a USD as a scene where MuJoCo has the decoder. Raises BadInput where not, and MissingDependency."""
+    mujoco = _mujoco("a USD")
+    try:
+        model = _model(path, mujoco)
+    except ValueError:
+        raise BadInput(
+            f"{path}: MuJoCo {mujoco.__version__} as it is installed does not read USD",
+            hint="write the scene as URDF, MJCF or SDF",
+        ) from None
+    return _Reader(path, mujoco, model).scene()
+
+
+def _model(path: Path, mujoco: Any) -> Any:
+    """Return MuJoCo's model of a file. Raises ValueError."""
+    mujoco.set_mju_user_warning(lambda text: None)  # else into a file where it runs
+    try:
+        return mujoco.MjSpec.from_file(str(path)).compile()
+    finally:
+        mujoco.set_mju_user_warning(None)
+
+
+def _mujoco(what: str) -> Any:
     try:
         import mujoco
     except ImportError:
         raise MissingDependency(
-            "an MJCF is read by MuJoCo, which is not installed", hint="pip install 'scenewright[mujoco]'"
+            f"{what} is read by MuJoCo, which is not installed", hint="pip install 'scenewright[mujoco]'"
         ) from None
     return mujoco
 
@@ -75,7 +94,7 @@ class _Reader:
             mujoco.mj_resetDataKeyframe(model, self.data, 0)
         mujoco.mj_forward(model, self.data)
         self.findings: list[str] = []
-        self.hulls = Hulls()
+        self.hulls = Hulls(self.findings)
         self.plain = plain = PlainNames()
         self.names = [plain.of("worldbody")]
         self.names += [plain.of(model.body(k).name or f"body_{k}") for k in range(1, model.nbody)]
@@ -103,6 +122,7 @@ class _Reader:
             joint_values=self.values,
             grounds=frozenset(self.grounds & {body.name for body in bodies}),
             numbers=numbers,
+            model=model,
             findings=few_findings(self.findings),
         )
 
@@ -204,7 +224,7 @@ class _Reader:
             mesh = int(model.geom_dataid[geom])
             start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
             points = np.array(model.mesh_vert[start : start + count], dtype=float)
-            return self.hulls.shape(points @ pose[:3, :3].T + pose[:3, 3])
+            return self.hulls.shape(points @ pose[:3, :3].T + pose[:3, 3], model.mesh(mesh).name)
         if kind == "ellipsoid":
             turns = np.random.default_rng(0).normal(size=(400, 3))
             ball = size * turns / np.linalg.norm(turns, axis=1, keepdims=True)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.library.importing.limits import told_refusals
-from scenewright.stages.library.importing.scenes.mjcf_scene import mjcf_scene
+from scenewright.stages.library.importing.scenes.mjcf_scene import mjcf_scene, usd_scene
 from scenewright.stages.library.importing.scenes.sdf_scene import sdf_scene
 from scenewright.stages.library.importing.scenes.urdf_scene import urdf_scene
 from scenewright.stages.library.importing.scenes.writing import OthersScene, write_scene
@@ -33,8 +34,13 @@ class OpenedScene:
 
     folder: Path
     """With scene.json, bodies and scene.mjcf.xml."""
-    others: OthersScene | None = None
-    """What was read of another's file; None for a folder of ours."""
+    format: str = "scene folder"
+    findings: tuple[str, ...] = ()
+    """What of another's file was left out, or taken as something else."""
+    model: Any = None
+    """What MuJoCo made of an MJCF, which it runs in place of scene.mjcf.xml."""
+    numbers: Mapping[str, int] = field(default_factory=dict)
+    """Free body -> its number in that."""
 
 
 @contextmanager
@@ -51,12 +57,14 @@ def opened_scene(path: Path) -> Iterator[OpenedScene]:
     if not path.is_file():
         raise BadInput(f"{path}: there is no such file or folder", hint=WHAT_IS_READ)
     if path.suffix.lower() in USD:
-        raise BadInput(f"{path}: USD is not read: MuJoCo as it is installed has no decoder for it", hint=WHAT_IS_READ)
-    tag = SourceFolder(path.parent).read_xml(path).tag
-    if tag not in READERS:
-        raise BadInput(f"{path}: root element is <{tag:.40}>", hint=WHAT_IS_READ)
+        read = usd_scene
+    else:
+        tag = SourceFolder(path.parent).read_xml(path).tag
+        if tag not in READERS:
+            raise BadInput(f"{path}: root element is <{tag:.40}>", hint=WHAT_IS_READ)
+        read = READERS[tag]
     with tempfile.TemporaryDirectory() as folder:
         with told_refusals(str(path)):
-            scene = READERS[tag](path)
+            scene = read(path)
             write_scene(Path(folder), scene)
-        yield OpenedScene(Path(folder), scene)
+        yield OpenedScene(Path(folder), scene.format, scene.findings, scene.model, scene.numbers)

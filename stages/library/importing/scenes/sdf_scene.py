@@ -45,7 +45,7 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         self.path, self.folder = path, SourceFolder(path.parent)
         self.findings: list[str] = []
-        self.allowance, self.hulls = Allowance(str(path)), Hulls()
+        self.allowance, self.hulls = Allowance(str(path)), Hulls(self.findings)
         self.root = self.folder.read_xml(path)
         worlds = self.root.findall("world")
         if len(worlds) > 1:
@@ -215,10 +215,11 @@ class _Reader:
         if (mesh := geometry.find("mesh")) is not None:
             scale = np.diag([*numbers(mesh.findtext("scale") or "1 1 1", 3, f"{where}: scale"), 1.0])
             naming = Naming(self.folder, link.scope.path, self.findings, set(), self.allowance)
-            surfaces = mesh_surfaces(naming, (mesh.findtext("uri") or "").strip(), pose @ scale, None, "")
+            name = (mesh.findtext("uri") or "").strip()
+            surfaces = mesh_surfaces(naming, name, pose @ scale, None, "")
             if (part := (mesh.findtext("submesh/name") or "").strip()) != "":
                 surfaces = [surface for surface in surfaces if part in surface.name] or surfaces
-            return [self.hulls.shape(np.concatenate([surface.vertices for surface in surfaces]))]
+            return [self.hulls.shape(np.concatenate([surface.vertices for surface in surfaces]), name)]
         for kind, keys in SIZES.items():
             if (solid := geometry.find(kind)) is not None:
                 count = 3 if kind == "box" else 1

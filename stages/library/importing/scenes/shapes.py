@@ -14,16 +14,26 @@ GROUND_SIZE, GROUND_DEPTH = 100.0, 1.0
 """A plane collides as a box of this size below it [m]."""
 
 
+HOLLOW = 0.005
+"""A mesh is spoken of when a corner of it lies deeper in its hull [m]: as deep as bodies that collide."""
+MOST_CORNERS = 2000
+"""Corners of a mesh that are looked at."""
+
+
 @dataclass
 class Hulls:
     """Convex hulls that shapes name, by the file that they are written to."""
 
+    findings: list[str]
     solids: dict[str, Solid] = field(default_factory=dict)
 
-    def shape(self, points: np.ndarray) -> Shape:
-        """Return the hull of points (N, 3) [m], link frame, as a shape."""
+    def shape(self, points: np.ndarray, name: str = "") -> Shape:
+        """Return the hull of points (N, 3) [m], link frame, as a shape; say of the mesh `name` when it is hollow."""
         file = f"meshes/hull_{len(self.solids)}.obj"
         self.solids[file] = hull_or_box(points)
+        depth = _depth_in(self.solids[file], points[:: 1 + len(points) // MOST_CORNERS]) if name else 0.0
+        if depth > HOLLOW:
+            self.findings.append(f"mesh {name!r:.80} collides as its hull, up to {1000 * depth:.0f} mm off its surface")
         return Shape(mesh=file)
 
     def bounds(self, shape: Shape) -> np.ndarray:
@@ -59,3 +69,13 @@ def ground_shape(link_from_plane: np.ndarray) -> Shape:
     """Return a plane's upper side (its z) as that of a large box."""
     below = transform_from(np.eye(3), np.array([0.0, 0.0, -GROUND_DEPTH / 2]))
     return Shape(box_size=(GROUND_SIZE, GROUND_SIZE, GROUND_DEPTH), link_from_shape=link_from_plane @ below)
+
+
+def _depth_in(solid: Solid, points: np.ndarray) -> float:
+    """Return how deep [m] the deepest of points (N, 3) lies in a convex solid."""
+    corners = solid.vertices[solid.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals, corner = normals[lengths > 0] / lengths[lengths > 0, None], corners[lengths > 0, 0]
+    offsets = np.einsum("ij,ij->i", normals, corner)
+    return float(max((np.min(offsets - normals @ point) for point in points), default=0.0))

@@ -37,7 +37,7 @@ class _Reader:
         self.path, self.folder = path, SourceFolder(path.parent)
         self.findings: list[str] = []
         self.allowance = Allowance(str(path))
-        self.hulls = Hulls()
+        self.hulls = Hulls(self.findings)
         self.names: dict[tuple[str, str], str] = {}
 
     def scene(self) -> OthersScene:
@@ -92,8 +92,9 @@ class _Reader:
         if (mesh := geometry.find("mesh")) is not None:
             scale = np.diag([*numbers(mesh.get("scale", "1 1 1"), 3, f"{where}: scale"), 1.0])
             naming = Naming(self.folder, self.path, self.findings, set(), self.allowance)
-            surfaces = mesh_surfaces(naming, mesh.get("filename", ""), pose @ scale, None, "")
-            return [self.hulls.shape(np.concatenate([surface.vertices for surface in surfaces]))]
+            name = mesh.get("filename", "")
+            surfaces = mesh_surfaces(naming, name, pose @ scale, None, "")
+            return [self.hulls.shape(np.concatenate([surface.vertices for surface in surfaces]), name)]
         for kind, keys in SIZES.items():
             if (solid := geometry.find(kind)) is not None:
                 count = 3 if kind == "box" else 1

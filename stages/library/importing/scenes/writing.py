@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scenewright.schemas.base import as_transform
@@ -40,6 +40,8 @@ class OthersScene:
     """Bodies with a plane."""
     numbers: dict[str, int] = field(default_factory=dict)
     """Free body -> its number in MuJoCo, of an MJCF."""
+    model: Any = None
+    """What MuJoCo made of an MJCF."""
     findings: tuple[str, ...] = ()
     """What was left out, or taken as something else."""
 
