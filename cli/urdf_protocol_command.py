@@ -17,6 +17,10 @@ def urdf_protocol(
         Path,
         typer.Argument(help="Folder of an interactive scene, `room/` of a ground truth, or a URDF, MJCF or SDF file."),
     ],
+    root: Annotated[
+        Path | None,
+        typer.Option("--root", help="Folder that the meshes of a URDF or SDF lie in. [default: that of the file]"),
+    ] = None,
     seen: Annotated[
         int | None, typer.Option("--seen", min=1, help="Things that were seen. [default: those of its contact graph]")
     ] = None,
@@ -37,7 +41,7 @@ def urdf_protocol(
 
     if out is not None:
         _check_out(out)
-    with opened_scene(scene) as opened:
+    with opened_scene(scene, root) as opened:
         found = protocol(opened.folder, model=opened.model, numbers=opened.numbers, seen=seen)
         document = as_json(found, str(scene), opened.format, opened.findings)
         if out is not None:

@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import trimesh
 from scenewright.cli.main import run
 from scenewright.schemas.places import checkout
 
@@ -232,6 +234,52 @@ def test_a_missing_mesh_is_named(file: str, tmp_path: Path, capsys: pytest.Captu
     said = capsys.readouterr().err.strip().splitlines()
     assert len(said) == 1 and "gone/vase.stl" in said[0] and str(scene) in said[0]
     assert not out.exists()
+
+
+VASE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)]) * 0.1
+"""Corners of a mesh, with one more that is deep in their hull."""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A folder with meshes beside the scenes' own, one of them hollow."""
+    for folder in ("meshes", "scenes"):
+        (tmp_path / folder).mkdir()
+    faces = trimesh.convex.convex_hull(VASE).faces
+    hollow = trimesh.Trimesh([*VASE, [0, 0, 0.06]], [*faces, [0, 1, 8], [1, 2, 8]], process=False)
+    hollow.export(tmp_path / "meshes" / "vase.stl")
+    return tmp_path
+
+
+@pytest.mark.parametrize("file", ["scene.urdf", "scene.sdf"])
+def test_meshes_lie_in_the_root_and_hollow_ones_are_told(file: str, package: Path, judged: Any) -> None:
+    more = MESH[file].replace("gone/vase.stl", "package://vases/meshes/vase.stl")
+    scene = WRITERS[file](package / "scenes" / file, [TABLE, cup(0.8)], more)
+    assert run(["urdf", "protocol", str(scene)]) == 3
+    assert run(["urdf", "protocol", str(scene), "--root", str(package / "meshes")]) == 2
+    found = judged(scene, "--root", str(package))
+    assert found["bodies"] == 3 and found["fixed_pairs"] == 1  # it stands where the table does
+    assert any("vase.stl' collides as its hull, up to 40 mm off its surface" in line for line in found["findings"])
+
+
+def test_mjcf_says_itself_where_its_files_lie(package: Path, judged: Any) -> None:
+    (package / "meshes" / "vase.xml").write_text('<mujocoinclude><mesh name="vase" file="vase.stl"/></mujocoinclude>')
+    more = '<asset><include file="../meshes/vase.xml"/></asset><compiler meshdir="../meshes"/>'
+    scene = mjcf(package / "scenes" / "scene.xml", [TABLE, cup(0.8)], more)
+    vase = '<body name="vase" pos="3 0 0"><freejoint/><geom type="mesh" mesh="vase"/></body></worldbody>'
+    scene.write_text(scene.read_text().replace("</worldbody>", vase))
+    found = judged(scene, code=4)
+    assert (found["free"], found["stable"]) == (2, 1) and in_engines(found, "vase", "fell_through") == [True, True]
+    (package / "meshes" / "vase.stl").unlink()
+    assert run(["urdf", "protocol", str(scene)]) == 3
+    (package / "meshes" / "vase.xml").unlink()
+    assert run(["urdf", "protocol", str(scene)]) == 3
+
+
+def test_a_static_model_needs_no_inertia(tmp_path: Path, judged: Any) -> None:
+    scene = sdf(tmp_path / "scene.sdf", [TABLE, cup(0.8)])
+    scene.write_text(re.sub(r"<ixx>.*?</izz>", "<ixx>0</ixx><iyy>0</iyy><izz>0</izz>", scene.read_text(), count=1))
+    assert judged(scene)["sound"]
 
 
 UNKNOWN = {"scene.urdf": "<hologram/>", "scene.sdf": "<hologram/>"}

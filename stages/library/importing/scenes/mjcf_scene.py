@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from scenewright.schemas.errors import BadInput, MissingDependency
@@ -15,7 +16,7 @@ from scenewright.stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoin
 from scenewright.stages.kit.geometry.solids import MassProperties
 from scenewright.stages.kit.geometry.transforms import inverse, transform_from, transform_from_quaternion
 from scenewright.stages.library.importing.limits import few_findings, plain_text
-from scenewright.stages.library.importing.mjcf_document import MjcfDocument
+from scenewright.stages.library.importing.mjcf_document import MOST_INCLUDES
 from scenewright.stages.library.importing.scenes.bodies import bodies_of
 from scenewright.stages.library.importing.scenes.sdf_scene import check_gravity
 from scenewright.stages.library.importing.scenes.shapes import Hulls, ground_shape, solid_shape
@@ -29,8 +30,8 @@ LEVEL = 0.999
 KINDS = {"hinge": "revolute", "slide": "prismatic"}
 
 
-def mjcf_scene(path: Path) -> OthersScene:
-    """Read an MJCF as a scene. Raises BadInput, and MissingDependency without MuJoCo."""
+def mjcf_scene(path: Path, root: Path) -> OthersScene:
+    """Read an MJCF as a scene; where its files lie it says itself. Raises BadInput, MissingDependency."""
     mujoco = _mujoco("an MJCF")
     _check_files(path)
     try:
@@ -41,7 +42,7 @@ def mjcf_scene(path: Path) -> OthersScene:
     return _Reader(path, mujoco, model).scene()
 
 
-def usd_scene(path: Path) -> OthersScene:
+def usd_scene(path: Path, root: Path) -> OthersScene:
     """Read a USD as a scene where MuJoCo has the decoder. Raises BadInput where not, and MissingDependency."""
     mujoco = _mujoco("a USD")
     try:
@@ -74,16 +75,43 @@ def _mujoco(what: str) -> Any:
 
 
 def _check_files(path: Path) -> None:
-    """Raise BadInput for a file that an MJCF names and that is none: MuJoCo would open whatever has that name."""
-    document = MjcfDocument(SourceFolder(path.parent), path)
-    compiler = document.compiler
-    for element in document.root.iter():
-        name = element.get("file")
-        if element.tag in FOLDERS and name:
+    """Raise BadInput for a file that an MJCF or what it includes names, and that is none: MuJoCo would open whatever
+    has that name. Names are looked up as MuJoCo does, from the folder of the main file."""
+    roots = _with_included(path)
+    compiler = {key: value for root in roots for e in root.iter("compiler") for key, value in e.attrib.items()}
+    for root in roots:
+        for element in root.iter():
+            name = element.get("file")
+            if element.tag not in FOLDERS or not name:
+                continue
             shelf = compiler.get(FOLDERS[element.tag]) or compiler.get("assetdir") or ""
             bare = Path(name).name if compiler.get("strippath") == "true" else name
-            if not (path.parent / shelf / bare).is_file():
+            if not _is_file(path.parent / shelf / bare):
                 raise BadInput(f"{path}: {element.tag} {name!r:.100} is not there", hint="copy it there")
+
+
+def _with_included(path: Path) -> list[ElementTree.Element]:
+    """Return the root elements of an MJCF and of all that it includes, each file once. Raises BadInput."""
+    folder, files, roots = SourceFolder(path.parent), [path], []
+    for file in files:
+        root = folder.read_xml(file)
+        roots.append(root)
+        for name in [element.get("file", "") for element in root.iter("include")]:
+            included = path.parent / name
+            if not _is_file(included):
+                raise BadInput(f"{file}: includes {name!r:.100}, which is not there", hint="copy it there")
+            if included not in files:
+                files.append(included)
+        if len(files) > MOST_INCLUDES:
+            raise BadInput(f"{path}: includes more than {MOST_INCLUDES} files")
+    return roots
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that is too long, or with a zero byte
+        return False
 
 
 class _Reader:
@@ -242,14 +270,14 @@ class _Reader:
         if (model.body_gravcomp != 0).any():
             self.findings.append(f"{int((model.body_gravcomp != 0).sum())} bodies have gravcomp: taken as 0")
         for count, what in (
-            (int(model.neq), "<equality> hold"),
-            (int(model.ntendon), "<tendon> pull"),
-            (int(model.nu), "<actuator> push"),
-            (int(model.nflex), "<flex> are"),
-            (len(masks), "masks of contypes sort"),
+            (int(model.neq), "<equality> holds"),
+            (int(model.ntendon), "<tendon> pulls"),
+            (int(model.nu), "<actuator> pushes"),
+            (int(model.nflex), "<flex> is"),
+            (len(masks), "contype other than 1 sorts"),
         ):
             if count:
-                self.findings.append(f"{count} {what} in MuJoCo alone")
+                self.findings.append(f"{what} in MuJoCo alone ({count})")
 
 
 def _frame(position: np.ndarray, matrix: np.ndarray | None = None, quaternion: np.ndarray | None = None) -> np.ndarray:

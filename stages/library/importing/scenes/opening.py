@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scenewright.schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.stages.library.importing.limits import told_refusals
 from scenewright.stages.library.importing.scenes.mjcf_scene import mjcf_scene, usd_scene
 from scenewright.stages.library.importing.scenes.sdf_scene import sdf_scene
@@ -17,7 +17,7 @@ from scenewright.stages.library.importing.scenes.urdf_scene import urdf_scene
 from scenewright.stages.library.importing.scenes.writing import OthersScene, write_scene
 from scenewright.stages.library.importing.source_folder import SourceFolder
 
-READERS: dict[str, Callable[[Path], OthersScene]] = {
+READERS: dict[str, Callable[[Path, Path], OthersScene]] = {
     "robot": urdf_scene,
     "mujoco": mjcf_scene,
     "sdf": sdf_scene,
@@ -44,8 +44,10 @@ class OpenedScene:
 
 
 @contextmanager
-def opened_scene(path: Path) -> Iterator[OpenedScene]:
+def opened_scene(path: Path, root: Path | None = None) -> Iterator[OpenedScene]:
     """Open a scene folder of ours, or a URDF, MJCF or SDF file, for as long as the block lasts.
+
+    The meshes of URDF and SDF lie in `root` (None: the file's folder), and nothing beside it is read.
 
     Raises BadInput for what is none of these, and for what the file's reader refuses.
     """
@@ -63,8 +65,15 @@ def opened_scene(path: Path) -> Iterator[OpenedScene]:
         if tag not in READERS:
             raise BadInput(f"{path}: root element is <{tag:.40}>", hint=WHAT_IS_READ)
         read = READERS[tag]
+    path = path.resolve()
+    root = path.parent if root is None else root.resolve()
+    if not path.is_relative_to(root):
+        raise UsageError(f"--root {root}: {path} does not lie in it", hint="name a folder around the file")
     with tempfile.TemporaryDirectory() as folder:
         with told_refusals(str(path)):
-            scene = read(path)
+            scene = read(path, root)
             write_scene(Path(folder), scene)
-        yield OpenedScene(Path(folder), scene.format, scene.findings, scene.model, scene.numbers)
+        try:
+            yield OpenedScene(Path(folder), scene.format, scene.findings, scene.model, scene.numbers)
+        except BadInput as error:  # of what was made of it
+            raise BadInput(error.message.replace(folder, str(path)), hint="mend the file") from error

@@ -36,14 +36,14 @@ FRICTION = 1.0
 DOWN = (0.0, 0.0, -1.0)
 
 
-def sdf_scene(path: Path) -> OthersScene:
-    """Read an SDF file as a scene. Raises BadInput."""
-    return _Reader(path).scene()
+def sdf_scene(path: Path, root: Path) -> OthersScene:
+    """Read an SDF file as a scene; its meshes lie in `root`. Raises BadInput."""
+    return _Reader(path, root).scene()
 
 
 class _Reader:
-    def __init__(self, path: Path) -> None:
-        self.path, self.folder = path, SourceFolder(path.parent)
+    def __init__(self, path: Path, root: Path) -> None:
+        self.path, self.folder = path, SourceFolder(root)
         self.findings: list[str] = []
         self.allowance, self.hulls = Allowance(str(path)), Hulls(self.findings)
         self.root = self.folder.read_xml(path)

@@ -27,14 +27,14 @@ SIZES = {"box": ("size",), "sphere": ("radius",), **dict.fromkeys(("cylinder", "
 """Shape -> attributes with its sizes."""
 
 
-def urdf_scene(path: Path) -> OthersScene:
-    """Read a URDF as a scene. Raises BadInput."""
-    return _Reader(path).scene()
+def urdf_scene(path: Path, root: Path) -> OthersScene:
+    """Read a URDF as a scene; its meshes lie in `root`. Raises BadInput."""
+    return _Reader(path, root).scene()
 
 
 class _Reader:
-    def __init__(self, path: Path) -> None:
-        self.path, self.folder = path, SourceFolder(path.parent)
+    def __init__(self, path: Path, root: Path) -> None:
+        self.path, self.folder = path, SourceFolder(root)
         self.findings: list[str] = []
         self.allowance = Allowance(str(path))
         self.hulls = Hulls(self.findings)

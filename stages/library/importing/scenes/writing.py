@@ -90,9 +90,9 @@ def _closed(joint: UrdfJoint) -> float:
 
 
 def _whole(body: OthersBody) -> tuple[Link, ...]:
-    """Return the links; the first of what stands fast needs no mass, and loaders want one."""
+    """Return the links; the mass of the first of what stands fast does nothing, and loaders want one."""
     first = body.links[0]
-    if body.free or (first.inertial is not None and first.inertial.mass > 0):
+    if body.free:
         return body.links
     return replace(first, inertial=MassProperties(1.0, np.zeros(3), np.eye(3))), *body.links[1:]
 
@@ -134,6 +134,6 @@ def _tree(bodies: Iterable[OthersBody]) -> Urdf:
     for body in bodies:
         kind = "floating" if body.free else "fixed"
         joints.append(UrdfJoint(f"{body.name}__in_the_world", kind, WORLD, body.name, body.world_from_body))
-        links += body.links
+        links += _whole(body)
         joints += body.joints
     return Urdf("scene", tuple(links), tuple(joints))
