@@ -148,6 +148,7 @@ ROWS = [
         given=given_mjcf,
     ),
     others("cli/urdf_protocol_command.py", "--out", "s.urdf --out full", "s.urdf --out out"),
+    others("stages/library/importing/scenes/opening.py", "--root", "s.urdf --root full", "s.urdf --root ."),
     others("stages/urdf/protocol_yield.py", "--seen", "s.urdf --seen 1", "s.urdf --seen 2"),
     others(
         "stages/urdf/protocol_text.py", "--seen N", "s.urdf", "s.urdf --seen 4", code=0, shows="yield: 2 of 4 (50.0 %)"
