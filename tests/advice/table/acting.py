@@ -162,6 +162,12 @@ ROWS = [
     ),
     Tried(
         "stages/plan/parameters.py",
+        "with --eyes true nothing is segmented",
+        PLAN + ON + "--segmenter-errors detector --dry-run",
+        PLAN + ON + "--segmenter-errors detector --eyes camera --dry-run",
+    ),
+    Tried(
+        "stages/plan/parameters.py",
         "--planner fast-downward plans in",
         PLAN + "--domain own.pddl --planner fast-downward --dry-run",
         PLAN + "--planner fast-downward --dry-run",
