@@ -101,9 +101,11 @@ def write_episode(
     width: int,
     segmenter: str = "",
     robot: str = USUAL_ROBOT,
+    room: str = "",
 ) -> AgentEpisode:
     """Run a trial and write it down. `language` says, when it is over, what was asked of a model; `segmenter` is what
-    the service that was asked for masks says it is, `robot` the name that its description has."""
+    the service that was asked for masks says it is, `robot` the name that its description has, `room` the digest of the
+    truth whose room it was in."""
     watching = Watching()
     session, world = run_trial(setting, arm, brain, one_program=one_program, watch=watching.see)
     scored = score(setting.goals, impossible, session, world)
@@ -120,6 +122,7 @@ def write_episode(
         perception=scales[1],
         segmenter=segmenter,
         robot=robot,
+        room=room,
         most_turns=setting.limits.turns,
         end=session.end,
         said=session.words,

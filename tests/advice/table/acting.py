@@ -104,8 +104,8 @@ TEACH = "predicates teach --out l --dry-run"
 EVALUATE = "predicates evaluate --out e --each 1 --states 10 "
 ROWS = [
     Tried(AGENT, "--task is empty", "agent run --task ' ' --out a --dry-run", RUN),
-    agent("--scene and --truth go together", "--scene {golden}/interactive_scene", SCENE),
-    agent("--world and --scene are two rooms", SCENE + "--world {golden}/agent_episode/apartment.json", SCENE),
+    agent("--scene is what the robot knows of a room", "--scene {golden}/interactive_scene", SCENE),
+    agent("--world and --truth are two rooms", SCENE + "--world {golden}/agent_episode/apartment.json", SCENE),
     agent("give --simulation physics too", "--segmenter http://127.0.0.1:9", SEGMENTER + "--arm ours", then_code=5),
     agent("--segmenter errs as it does", SEGMENTER + "--arm oracle", "--simulation physics --arm oracle"),
     agent("give --brain language too", RECORDED, "--brain language " + RECORDED, given=given_transcript),

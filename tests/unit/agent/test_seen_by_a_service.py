@@ -16,6 +16,7 @@ from scenewright.stages.agent import replay_stage, run_stage
 from scenewright.stages.agent.parameters import ReplayParameters, RunParameters, check_run
 from scenewright.stages.agent.segmenter_identity import versions
 from scenewright.stages.agent.world.physics import looking
+from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.asked import AskedSegmenter, word_of
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.kit.progress import SilentProgress
@@ -93,7 +94,7 @@ def test_the_robot_sees_by_the_masks_and_by_nothing_true(address: str, monkeypat
 
     take = looking.take
     monkeypatch.setattr(looking, "take", untold)
-    body = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3, AskedSegmenter(address, 3))
+    body = PhysicsBody(ApartmentRoom(APARTMENT), ("apple", "plate"), NO_ERRORS, 3, AskedSegmenter(address, 3))
     try:
         tables = [piece for piece in body.sweep().furniture if piece.label == "table"]
         assert any(np.allclose(piece.centre, TABLE.centre, atol=0.08) for piece in tables)

@@ -220,6 +220,7 @@ def test_an_episode_is_whole_and_its_replay_the_same_bytes(tmp_path: Path) -> No
         if name == "again":
             replay(
                 AgentEpisode(tmp_path / "first"),
+                None,
                 parameters=ReplayParameters(image_width=400),
                 context=context(tmp_path / name, 99),
             )
@@ -236,7 +237,7 @@ def test_an_episode_is_whole_and_its_replay_the_same_bytes(tmp_path: Path) -> No
 def test_an_open_loop_episode_replays_too(tmp_path: Path) -> None:
     parameters = RunParameters(task="tidy_table", arm="open_loop", image_width=400)
     run_step(None, None, None, None, parameters=parameters, context=context(tmp_path / "a", 2))
-    again = replay(AgentEpisode(tmp_path / "a"), parameters=ReplayParameters(), context=context(tmp_path / "b"))
+    again = replay(AgentEpisode(tmp_path / "a"), None, parameters=ReplayParameters(), context=context(tmp_path / "b"))
     assert again.outcome != "differs"
 
 
@@ -360,9 +361,10 @@ def test_evaluation_counts_and_options_are_checked(tmp_path: Path) -> None:
     for wrong in ({"task": " "}, {"brain": "language"}, {"language": "openai"}):
         with pytest.raises(UsageError):
             check_run(RunParameters.model_validate(wrong), {})
-    for given in ({"scene": 1}, {"truth": 1}, {"scene": 1, "truth": 1, "world": 1}):
+    for given in ({"scene": 1}, {"truth": 1, "world": 1}, {"scene": 1, "truth": 1, "world": 1}):
         with pytest.raises(UsageError):
             check_run(RunParameters(), given)
+    check_run(RunParameters(), {"truth": 1})
 
 
 def test_what_may_be_of_either_class_is_brought_where_both_are_wanted() -> None:

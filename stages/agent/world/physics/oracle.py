@@ -20,7 +20,7 @@ class NoisyOracle:
     def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
         """Return the masks of furniture, without errors."""
         names = {int(number): self._room.named.get(int(number), "") for number in np.unique(picture.instance)}
-        owners = {number: name.split("__")[0] for number, name in names.items()}  # a door is of its furniture
+        owners = {number: self._room.owner(name) for number, name in names.items()}
         return [
             Mask(piece.label, np.isin(picture.instance, [number for number, owner in owners.items() if owner == name]))
             for name, piece in self._room.furniture.items()
@@ -28,19 +28,19 @@ class NoisyOracle:
         ]
 
     def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
-        """Return the masks of things, handles, doors and drawers. `view`: ("hand", number), or (quarter turn, near)."""
+        """Return the masks of things, handles, doors, drawers and fixtures. `view`: ("hand", number), or (quarter turn,
+        near)."""
         noisy_masks = []
         for number in np.unique(picture.instance):
             name = self._room.named.get(int(number), "")
             mask = picture.instance == number
-            part = self._room.parts.get(name, "")
-            if not part and name not in self._room.things or mask.sum() < LEAST_PIXELS:
+            label = self._room.label(name)
+            if not label or mask.sum() < LEAST_PIXELS:
                 continue
             if view[0] != "hand" and self._errors.misses(
                 name, self._room.moved.get(name, 0), int(str(view[0])), bool(view[1])
             ):
                 self.missed.add(name)
                 continue
-            label = part or self._room.things[name].label
             noisy_masks.append(Mask(self._errors.class_of(name, label, *view), mask))
         return noisy_masks
