@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 FRUIT = ("apple", "banana", "orange", "lemon")
 TOYS = ("doll", "teddy", "duck", "toy car")
@@ -49,6 +49,8 @@ class Move:
     onto: Description
     every: bool = False
     start: str = ""
+    inside: bool = field(default=False, compare=False)
+    """Words say that it goes in there, not on top."""
 
 
 @dataclass(frozen=True)

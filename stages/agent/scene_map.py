@@ -26,6 +26,8 @@ TWICE = 0.5
 """Share of the distance of one thing within which a second detection of one look is of it as well; by eye."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
+TOP = 0.08
+"""What lies no farther than this below the top of furniture is on it [m]; by eye."""
 FLOOR, PATCH = "floor", 0.1
 """What the floor under a thing is called, and its edge [m]."""
 Region = tuple[int | str, bool]
@@ -218,11 +220,15 @@ class SceneMap:
         """Return a thing or piece of furniture as programs see it."""
         if key in self.furniture:
             piece = self.furniture[key]
-            return SceneObject(key, piece.label, door=piece.door, opened=piece.opened)
+            return SceneObject(key, piece.label, door=piece.door, opened=piece.opened, top=piece.top, more=piece.more)
         item = self.items[key]
         doubt, ahead = (item.doubt, min(item.margin, self._enough)) if self.careful else ("", 0)
         on = self.carrier_of(item)
-        return SceneObject(key, item.label, item.place, item.color, item.used, on=on, doubt=doubt, ahead=ahead)
+        piece = self.furniture.get(item.place)
+        above = piece is not None and piece.top and item.position[2] > piece.height - TOP
+        return SceneObject(
+            key, item.label, item.place, item.color, item.used, top=above, on=on, doubt=doubt, ahead=ahead
+        )
 
     def global_map(self) -> ObjectMap:
         """Return the furniture."""

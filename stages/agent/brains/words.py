@@ -24,7 +24,7 @@ CLAUSES = re.compile(r"[.;!?]|,? and then |,? then |,? and (?=\w+ing )?")
 MOVE = re.compile(
     r"(?:(?:put|place|move|bring|take|get|carry|transfer)\s+)?(?P<what>.+?)\s+"
     r"(?:(?:out of|from|on|off)\s+(?:the\s+|all\s+)*(?P<start>\w+(?: \w+)??)\s+)??"
-    r"(?:onto|on|to|into|in|inside)\s+(?P<onto>(?:the|a|an|my)\s+.+|\w+)"
+    r"(?P<how>onto|on|to|into|in|inside)\s+(?P<onto>(?:the|a|an|my)\s+.+|\w+)"
 )
 TAKE_OUT = re.compile(r"(?:take|get)\s+(?P<what>.+?)\s+(?:out of|from)\s+(?:the\s+)?(?P<start>\w+(?: \w+)?)")
 AMONG = re.compile(r"(?:put|place)\s+(?P<what>.+?)\s+in(?:to)? the middle of\s+(?P<around>.+)")
@@ -74,11 +74,11 @@ def _clause(clause: str, clean: bool, taken: Move | None) -> Goal:
     if found := SHUT.fullmatch(clause):
         return Shut(kind(_furniture(found["what"])), found["how"] == "open")
     if found := MOVE.fullmatch(clause):
-        onto = _carrier(found["onto"])
+        onto, inside = _carrier(found["onto"]), found["how"].startswith("in")
         if taken is not None and re.search(r"\bit\b", found["what"]):
-            return Move(taken.what, onto, taken.every, taken.start)
+            return Move(taken.what, onto, taken.every, taken.start, inside)
         what, every = _things(found["what"], clean)
-        return Move(what, onto, every, _furniture(found["start"]) if found["start"] else "")
+        return Move(what, onto, every, _furniture(found["start"]) if found["start"] else "", inside)
     raise NotUnderstood(f"I do not understand {clause[:80]!r}")
 
 
@@ -86,7 +86,7 @@ def _literal(found: re.Match[str]) -> Goal:
     first, second = found["first"], found["second"]
     if found["name"] in ("closed", "open"):
         return Shut(kind(_furniture(first)), found["name"] == "open")
-    return Move(_things(first, False)[0], _carrier(second or ""))
+    return Move(_things(first, False)[0], _carrier(second or ""), inside=found["name"] == "in")
 
 
 def _things(phrase: str, clean: bool) -> tuple[Description, bool]:

@@ -18,7 +18,8 @@ from scenewright.stages.agent.world.physics.before_fronts import bases_outside
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.doors import doored
 from scenewright.stages.agent.world.physics.eyes import HEAD, Mask, Surface
-from scenewright.stages.agent.world.physics.fronts import Front, edges, front_seen
+from scenewright.stages.agent.world.physics.front_seeing import front_seen
+from scenewright.stages.agent.world.physics.fronts import Front, edges
 from scenewright.stages.agent.world.physics.looking import is_thing
 from scenewright.stages.kit.geometry.transforms import apply, look_at
 from scenewright.stages.kit.motion.doors import body_from_moved

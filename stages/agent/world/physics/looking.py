@@ -6,6 +6,7 @@ from itertools import product
 from math import atan2, cos, pi, sin
 
 import numpy as np
+from scenewright.stages.agent.goals import FURNITURE, THINGS
 from scenewright.stages.agent.scene_map import quarter
 from scenewright.stages.agent.senses import Base, Detection, Look, Position, Sweep
 from scenewright.stages.agent.world.physics import head
@@ -118,7 +119,7 @@ class Looking:
         self._count_missed()
         self.looked_near = (self._robot.base, at) if close else None
         surfaces = [s for s in surfaces if not self._robot.in_hand(s.middle[None])[0]]
-        surfaces_near = [s for s in fuse(surfaces) if is_thing(s) and self._seen.belongs(s, at, piece, close)]
+        surfaces_near = [s for s in fuse(surfaces) if _matters(s) and self._seen.belongs(s, at, piece, close)]
         self._seen.keep(surfaces_near, at, piece, close)
         return Look(tuple(self._detection(s, sector, close, at) for s in surfaces_near), sector, close)
 
@@ -237,6 +238,11 @@ class Looking:
 def is_thing(surface: Surface) -> bool:
     """Whether a surface is small enough for a thing: what is wider is of furniture, whatever its mask says."""
     return float((surface.high - surface.low)[:2].max()) < WIDEST
+
+
+def _matters(surface: Surface) -> bool:
+    """Whether a surface is of a thing, or of something that the robot has no word for and that is in the way."""
+    return is_thing(surface) or surface.label not in (*THINGS, *FURNITURE)
 
 
 def _things(masks: list[Mask]) -> list[Mask]:

@@ -47,7 +47,7 @@ class SceneRoom(Room):
             for name, record in records.items()
             if name in self.furniture
             for joint in record.joints
-            if _is_front(record, joint)
+            if is_front(record, joint)
         }
         self.parts = {
             part: "door" if joint.type == "revolute" else "drawer" for part, (_, joint) in self._fronts.items()
@@ -131,18 +131,19 @@ class SceneRoom(Room):
         return "floor"
 
 
-def _is_front(record: SceneBody, joint: Joint) -> bool:
+def is_front(record: SceneBody, joint: Joint) -> bool:
     """Whether a part is a door or a drawer: it turns about the vertical, or slides level."""
     axis = np.array(record.world_from_body)[:3, :3] @ np.array(joint.axis)
     along = abs(float(axis[2])) / float(np.linalg.norm(axis))
-    return along >= UPRIGHT if joint.type == "revolute" else along <= np.sqrt(1 - UPRIGHT**2)
+    return along >= UPRIGHT if joint.type == "revolute" else along <= 1 - UPRIGHT
 
 
 def split_handle(meshes: list[trimesh.Trimesh], at: np.ndarray) -> tuple[list[trimesh.Trimesh], list[trimesh.Trimesh]]:
     """Return the meshes of a part without, and of, the connected piece that is gripped at a point (3,) of its frame:
     no handle where that piece is most of the part."""
     area = sum(float(mesh.area) for mesh in meshes)
-    front, handle = [], []
+    front: list[trimesh.Trimesh] = []
+    handle: list[trimesh.Trimesh] = []
     for mesh in meshes:
         groups = trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(mesh.faces)), min_len=1)
         gripped = [
@@ -157,5 +158,7 @@ def split_handle(meshes: list[trimesh.Trimesh], at: np.ndarray) -> tuple[list[tr
             of_handle[faces] = True
         for pieces, chosen in ((front, ~of_handle), (handle, of_handle)):
             if chosen.any():
-                pieces.append(mesh.submesh([np.flatnonzero(chosen)], append=True, repair=False))
+                piece = mesh.submesh([np.flatnonzero(chosen)], append=True, repair=False)
+                assert isinstance(piece, trimesh.Trimesh)
+                pieces.append(piece)
     return front, handle

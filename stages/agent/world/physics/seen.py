@@ -12,7 +12,7 @@ from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 from scenewright.stages.agent.world.physics import head
 from scenewright.stages.agent.world.physics.beliefs import Believed
 from scenewright.stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
-from scenewright.stages.agent.world.physics.fronts import WITH_DRAWERS, WITH_LEAVES, Front, footprint
+from scenewright.stages.agent.world.physics.fronts import OF_EITHER, WITH_DRAWERS, WITH_LEAVES, Front, footprint
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply
@@ -40,7 +40,10 @@ class Seen:
         self.pieces: list[head.SeenPiece] = []
         self.surfaces: list[Surface] = []
         self.fronts: dict[str, Front] = {}
-        """Doors and drawers of which the handle was seen, by the names of `boxes`."""
+        """Doors and drawers of which the handle was seen, by the names of `boxes`: of each piece the one that was
+        opened last, or that will be opened next."""
+        self.waiting: dict[str, list[Front]] = {}
+        """Other doors and drawers of the same pieces that were not opened yet, the next one first."""
         self.obstacles = ObstacleMap(robot.base, clearance, COMFORT)
 
     def furniture(self) -> list[SeenFurniture]:
@@ -62,18 +65,29 @@ class Seen:
         if front is not None and opened and not front.slides:
             outward = float(np.arctan2(*front.map_from_front[1::-1, 0]))
         if front is not None and opened and front.slides:
-            ends = zip(footprint(front, NEARER), (low[2], high[2]), strict=True)
-            low, high = (np.array([*corner, z]) for corner, z in ends)
+            near, far = self._stands_over(number, NEARER)
+            low, high = np.array([*near, low[2]]), np.array([*far, high[2]])
         centre, size = (low + high) / 2, np.maximum(high - low, 0.1)
         return SeenFurniture(
             piece.label,
             (float(centre[0]), float(centre[1])),
             (float(size[0]), float(size[1])),
             float(high[2]),
-            piece.label in (*WITH_DRAWERS, *WITH_LEAVES),
+            piece.label in (*WITH_DRAWERS, *WITH_LEAVES, *OF_EITHER),
             opened,
             outward,
+            piece.label in OF_EITHER,
+            bool(self.waiting.get(f"furniture_{number}")),
         )
+
+    def _stands_over(self, number: int, less: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners (2,), (2,) over which a piece stands, with its drawer, `less` [m] of that one's front; a
+        leaf is left out."""
+        front, (low, high) = self.fronts.get(f"furniture_{number}"), self.pieces[number].box
+        if front is None:
+            return low[:2], high[:2]
+        near, far = footprint(front, less)
+        return (near, far) if front.alone else (np.minimum(near, low[:2]), np.maximum(far, high[:2]))
 
     def keep_floor(self, picture: Picture, map_from_camera: np.ndarray, front: Front) -> None:
         """Measure the height on which things inside an open front lie: the most frequent height there [m]."""
@@ -127,9 +141,8 @@ class Seen:
         if at[2] < FLOOR:
             return None
         for number, piece in enumerate(self.pieces):
-            front = self.fronts.get(f"furniture_{number}")
-            low, high = piece.box if front is None else footprint(front)
-            if len(piece.cubes) >= head.LEAST and np.all((at[:2] > low[:2] - 0.1) & (at[:2] < high[:2] + 0.1)):
+            low, high = self._stands_over(number)
+            if len(piece.cubes) >= head.LEAST and np.all((at[:2] > low - 0.1) & (at[:2] < high + 0.1)):
                 return number
         return None
 
