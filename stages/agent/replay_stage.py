@@ -23,7 +23,7 @@ from scenewright.stages.kit.stage import Context
 
 
 def run(
-    episode: AgentEpisode, truth: GroundTruth | None, *, parameters: ReplayParameters, context: Context
+    episode: AgentEpisode, truth: GroundTruth | None = None, *, parameters: ReplayParameters, context: Context
 ) -> AgentEpisode:
     """Carry out the programs of an episode in its world once more: in the room of `truth`, where it was in one."""
     file = episode.info

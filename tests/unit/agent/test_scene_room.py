@@ -4,27 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
+from scenewright.schemas.agent_episode import AgentEpisode
+from scenewright.schemas.errors import BadInput
+from scenewright.schemas.ground_truth import GroundTruth, GroundTruthFile
 from scenewright.schemas.interactive_scene import InteractiveSceneFile
-from scenewright.schemas.scene_parts import Joint
+from scenewright.schemas.scene_parts import Camera, Joint
 from scenewright.stages.agent.brains.words import understood
 from scenewright.stages.agent.goals import kind
-from scenewright.stages.agent.judging import goals_hold
-from scenewright.stages.agent.trials import Setting, run_trial
+from scenewright.stages.agent.parameters import ReplayParameters, RunParameters
+from scenewright.stages.agent.replay_stage import run as replay
+from scenewright.stages.agent.run_stage import run as run_step
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.eyes import HEAD, Surface
-from scenewright.stages.agent.world.physics.front_seeing import fronts_seen
+from scenewright.stages.agent.world.physics.front_seeing import fronts_seen, open_shelf
 from scenewright.stages.agent.world.physics.scene_room import SceneRoom, is_front, split_handle
-from scenewright.stages.agent.world.reconstructed import apartment_of
+from scenewright.stages.agent.world.reconstructed import apartment_of, lived_in
+from scenewright.stages.engine.digests import content_digest, record_files
 from scenewright.stages.kit.geometry.transforms import apply, look_at
 from scenewright.stages.kit.motion.doors import body_from_moved
 from scenewright.stages.kit.simulation.engine import engine
 
 from tests.unit.agent.made_scene import CABINET_AT, DRAWER_LOW, write_room
 from tests.unit.agent.test_doors import NO_ERRORS, surface
+from tests.unit.agent.test_sessions import context
 
 UPPER = "cabinet_3__drawer_2"
 
@@ -164,6 +171,20 @@ def test_a_door_that_stands_open_is_known_by_where_it_is() -> None:
     assert fronts_seen("furniture_0", "cabinet", BOX, [panel], BEFORE)[0].joint.type == "revolute"
 
 
+def test_a_shelf_is_open_where_its_inside_was_seen() -> None:
+    low, high = np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.4, 1.2])
+    random = np.random.default_rng(0)
+    before = random.uniform((0, 0, 0), (1, 0.01, 1.2), (900, 3))
+    boards = random.uniform((0.1, 0.1, 0.6), (0.9, 0.3, 0.62), (300, 3))
+    base = np.array([0.5, -0.8, np.pi / 2])
+    shelf = open_shelf("furniture_0", "shelf", (low, high), np.concatenate([before, boards]), base)
+    assert shelf is not None and shelf.before(base) and shelf.inside(np.array([[0.5, 0.2, 0.7]]))[0]
+    assert shelf.behind(np.array([0.5, 0.2, 0.7])) == pytest.approx(0.2)
+    assert len(shelf.outline()) == 0 and not shelf.of_part(boards, 0.05).any()
+    assert open_shelf("furniture_0", "shelf", (low, high), before, base) is None, "a plain block"
+    assert open_shelf("furniture_0", "table", (low, high), boards, base) is None
+
+
 @pytest.mark.slow
 def test_drawers_are_opened_one_after_the_other(tmp_path: Path) -> None:
     room = scene_room(write_room(tmp_path / "room"))
@@ -181,16 +202,52 @@ def test_drawers_are_opened_one_after_the_other(tmp_path: Path) -> None:
     body.close()
 
 
+def truth_of_room(folder: Path, digest: str) -> GroundTruth:
+    """Return the handle of a generated truth whose room is the one made by hand."""
+    camera = Camera(width=4, height=3, fx=4, fy=4, cx=1.5, cy=1)
+    about = {
+        "seed": 0,
+        "recipe": "hand",
+        "room_size": (5, 5, 2.5),
+        "frame_count": 0,
+        "depth_noise": False,
+        "objects": (),
+    }
+    GroundTruthFile(camera=camera, **about).write(folder / "ground_truth.json")  # type: ignore[arg-type]
+    return GroundTruth(folder, manifest=SimpleNamespace(content_digest=digest))  # type: ignore[arg-type]
+
+
 @pytest.mark.slow
-def test_a_task_in_words_is_done_among_library_furniture(tmp_path: Path) -> None:
-    room = write_room(tmp_path / "room")
-    apartment = apartment_of(InteractiveSceneFile.read(room / "scene.json").bodies, "a room")
-    goals = understood("put the cup on the table")
-    session, world = run_trial(
-        Setting(apartment, "put the cup on the table", goals, NO_ERRORS, 4, world="physics", room=room), "ours"
+def test_a_task_in_words_is_done_among_library_furniture_and_again_from_its_episode(tmp_path: Path) -> None:
+    write_room(tmp_path / "truth" / "room")
+    truth, other = (truth_of_room(tmp_path / "truth", digest) for digest in ("1" * 64, "2" * 64))
+    parameters = RunParameters(task="put the cup on the table", simulation="physics", image_width=300)
+    made = run_step(None, None, truth, None, parameters=parameters, context=context(tmp_path / "made", 4))
+    assert made.outcome == "ok" and made.info.score.success and made.info.room == "1" * 64
+    assert "open(rooms['cabinet_0'])" in "\n".join(turn.code for turn in made.info.turns), "the cup was in a drawer"
+    small = ReplayParameters(image_width=300)
+    replay(AgentEpisode(tmp_path / "made"), truth, parameters=small, context=context(tmp_path / "again"))
+    digests = {content_digest(record_files(tmp_path / name, ())) for name in ("made", "again")}
+    assert len(digests) == 1
+    for wrong in (None, other):
+        with pytest.raises(BadInput, match="the room of the truth 111111111111"):
+            replay(AgentEpisode(tmp_path / "made"), wrong, parameters=small, context=context(tmp_path / "wrong"))
+
+
+def test_a_room_is_lived_in_by_its_truth_alone_in_the_fast_world_and_a_scan_has_none(tmp_path: Path) -> None:
+    write_room(tmp_path / "truth" / "room")
+    truth = truth_of_room(tmp_path / "truth", "1" * 64)
+    parameters = RunParameters(task="put the can on the cabinet", arm="oracle", failures=0, image_width=300)
+    made = run_step(None, None, truth, None, parameters=parameters, context=context(tmp_path / "made"))
+    assert (
+        made.outcome == "ok"
+        and made.info.room == ""
+        and {f.label for f in made.apartment.furniture} == {"table", "cabinet"}
     )
-    assert session.end == "done" and goals_hold(goals, world)
-    world.close()
+    scan = truth.info.model_copy(update={"source": "scan"})
+    scan.write(tmp_path / "truth" / "ground_truth.json")
+    with pytest.raises(BadInput, match="no room to live in"):
+        lived_in(GroundTruth(tmp_path / "truth"))
 
 
 def test_words_name_furniture_of_two_words_and_say_on_or_in() -> None:

@@ -220,7 +220,6 @@ def test_an_episode_is_whole_and_its_replay_the_same_bytes(tmp_path: Path) -> No
         if name == "again":
             replay(
                 AgentEpisode(tmp_path / "first"),
-                None,
                 parameters=ReplayParameters(image_width=400),
                 context=context(tmp_path / name, 99),
             )
@@ -237,7 +236,7 @@ def test_an_episode_is_whole_and_its_replay_the_same_bytes(tmp_path: Path) -> No
 def test_an_open_loop_episode_replays_too(tmp_path: Path) -> None:
     parameters = RunParameters(task="tidy_table", arm="open_loop", image_width=400)
     run_step(None, None, None, None, parameters=parameters, context=context(tmp_path / "a", 2))
-    again = replay(AgentEpisode(tmp_path / "a"), None, parameters=ReplayParameters(), context=context(tmp_path / "b"))
+    again = replay(AgentEpisode(tmp_path / "a"), parameters=ReplayParameters(), context=context(tmp_path / "b"))
     assert again.outcome != "differs"
 
 

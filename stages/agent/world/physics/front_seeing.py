@@ -24,6 +24,12 @@ from scenewright.stages.agent.world.physics.fronts import (
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.doors import body_from_moved
 
+SHELVES = ("shelf",)
+INNER, SHOWS_INSIDE = 0.08, 0.1
+"""Distance from the outside from which on something is inside of furniture [m], and the least share of what was seen of
+a shelf that is there; by eye."""
+OPEN = 1.5
+"""How far what has no leaf counts as open [rad]."""
 Box = tuple[np.ndarray, np.ndarray]
 STANDS_OUT = 0.08
 """A drawer this far before its furniture stands open [m]; by eye."""
@@ -67,6 +73,23 @@ def fronts_seen(name: str, label: str, box: Box, surfaces: Sequence[Surface], ba
         front = front_seen(name, label, box, [handle, panels[k]], base, several=True)
         fronts += [] if front is None else [front]
     return sorted(fronts, key=lambda front: (front.value == 0, -front.bar[1][2]))
+
+
+def open_shelf(name: str, label: str, box: Box, points: np.ndarray, base: np.ndarray) -> Front | None:
+    """Return the open side, towards a base pose (3,), of a shelf in a box of which points (N, 3) were seen; None where
+    little of its inside was: it is shut, or a plain block."""
+    (low, high), across = box, int((box[1] - box[0])[:2].argmin())
+    inner = np.all((points[:, :2] > low[:2] + INNER) & (points[:, :2] < high[:2] - INNER), axis=1)
+    inside = inner & (points[:, 2] < high[2] - INNER) & (points[:, 2] > INNER)
+    if label not in SHELVES or np.mean(inside) < SHOWS_INSIDE:
+        return None
+    normal = np.zeros(2)
+    normal[across] = 1.0 if base[across] > (low + high)[across] / 2 else -1.0
+    frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*((low + high)[:2] / 2), 0.0]))
+    depth, width, top = (float(value) for value in ((high - low)[across], (high - low)[1 - across], high[2]))
+    corner = (depth / 2, width / 2, LEAF)
+    panel = (-width / 2, width / 2, LEAF, top)
+    return Front(name, label, frame, (depth, width, top), panel, (corner, corner), False, OPEN, leafless=True)
 
 
 def _beside(surface: Surface, box: Box) -> bool:

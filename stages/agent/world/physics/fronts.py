@@ -71,6 +71,8 @@ class Front:
     """How far it is open, as felt [rad] or [m]."""
     floor: float | None = None
     """Height on which things inside lie, as seen [m]."""
+    leafless: bool = False
+    """An open shelf: nothing moves, it is always open."""
     across: tuple[float, float] | None = None
     """From y to y of the whole furniture, where this is one of several fronts; the rest of it is taken for solid."""
 
@@ -122,6 +124,8 @@ class Front:
             *(slab(low, high) for low, high in self.solid()),
         ]
         low, high = np.array(self.bar[0]) - ROOM, np.array(self.bar[1]) + ROOM
+        if self.leafless:  # a speck within its back
+            return jointed_text(self.name, tuple(still), (slab((-x, 0.0, 0.0), (0.002 - x, 0.002, 0.002)),), self.joint)
         moving = [slab((inner, y0, z0), (x, y1, z1 + OVER)), slab(as_vector(low), as_vector(high))]
         if self.slides:
             edge = z0 + TRAY * (z1 - z0)
@@ -181,6 +185,8 @@ class Front:
 
     def of_part(self, points: np.ndarray, room: float) -> np.ndarray:
         """Return (N,) bool: points of the map that are of what moves, where it is now, or within `room` [m] of it."""
+        if self.leafless:
+            return np.zeros(len(points), bool)
         shut = apply(inverse(body_from_moved(self.joint, self.value)), self.local(points))
         y0, y1, z0, z1 = self.panel
         back = STAYS - self.size[0] / 2 if self.slides else self.size[0] / 2 - LEAF
@@ -189,6 +195,8 @@ class Front:
 
     def outline(self) -> np.ndarray:
         """Return points (N, 2) of the map over which what moves stands now, 5 cm apart at most."""
+        if self.leafless:
+            return np.zeros((0, 2))
         x, (y0, y1, _, _) = self.size[0] / 2, self.panel
         xs = np.arange(STAYS - x if self.slides else x - LEAF, x, 0.05)
         grid = np.stack(np.meshgrid(xs, np.arange(y0, y1 + 0.04, 0.05), [0.5]), -1).reshape(-1, 3)

@@ -90,6 +90,8 @@ class Looking:
         surfaces: list[Surface] = []
         renderer = None
         arms = [turned(self._robot.beliefs.chain, self._view, toward + t) for t in ((0.0,) if close else SIDEWAYS)]
+        if not close:
+            self._seen.keep_shelf(piece)
         shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
         if shelf is not None and not shelf.slides:
             arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)

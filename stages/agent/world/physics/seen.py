@@ -12,6 +12,7 @@ from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 from scenewright.stages.agent.world.physics import head
 from scenewright.stages.agent.world.physics.beliefs import Believed
 from scenewright.stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
+from scenewright.stages.agent.world.physics.front_seeing import open_shelf
 from scenewright.stages.agent.world.physics.fronts import OF_EITHER, WITH_DRAWERS, WITH_LEAVES, Front, footprint
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
 from scenewright.stages.kit.geometry.cameras import back_project
@@ -122,6 +123,16 @@ class Seen:
         """Return the open front of the furniture or drawer that a position is in."""
         point = np.array([at[:3]], float)
         return next((f for f in self.fronts.values() if f.value > 0 and f.inside(point)[0]), None)
+
+    def keep_shelf(self, piece: int | None) -> None:
+        """Believe that a piece of which the inside was seen is an open shelf, open to where the robot stands."""
+        if piece is None or (f"furniture_{piece}" in self.fronts and not self.fronts[f"furniture_{piece}"].leafless):
+            return
+        name, seen = f"furniture_{piece}", self.pieces[piece]
+        points = np.array(sorted(seen.cubes)) * head.GRAIN
+        shelf = open_shelf(name, seen.label, seen.box, points, self._robot.believed)
+        if shelf is not None:
+            self.fronts[name] = shelf
 
     def keep_top(self, picture: Picture, map_from_camera: np.ndarray, piece: int | None) -> None:
         """Measure the height of the top of furniture that fills the picture: the most frequent height [m]."""
