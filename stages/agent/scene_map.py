@@ -224,8 +224,8 @@ class SceneMap:
         item = self.items[key]
         doubt, ahead = (item.doubt, min(item.margin, self._enough)) if self.careful else ("", 0)
         on = self.carrier_of(item)
-        piece = self.furniture.get(item.place)
-        above = piece is not None and piece.top and item.position[2] > piece.height - TOP
+        under = self.furniture.get(item.place)
+        above = under is not None and under.top and item.position[2] > under.height - TOP
         return SceneObject(
             key, item.label, item.place, item.color, item.used, top=above, on=on, doubt=doubt, ahead=ahead
         )

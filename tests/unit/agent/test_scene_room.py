@@ -229,9 +229,9 @@ def test_a_task_in_words_is_done_among_library_furniture_and_again_from_its_epis
     replay(AgentEpisode(tmp_path / "made"), truth, parameters=small, context=context(tmp_path / "again"))
     digests = {content_digest(record_files(tmp_path / name, ())) for name in ("made", "again")}
     assert len(digests) == 1
-    for wrong in (None, other):
+    for number, wrong in enumerate((None, other)):
         with pytest.raises(BadInput, match="the room of the truth 111111111111"):
-            replay(AgentEpisode(tmp_path / "made"), wrong, parameters=small, context=context(tmp_path / "wrong"))
+            replay(AgentEpisode(tmp_path / "made"), wrong, parameters=small, context=context(tmp_path / str(number)))
 
 
 def test_a_room_is_lived_in_by_its_truth_alone_in_the_fast_world_and_a_scan_has_none(tmp_path: Path) -> None:
