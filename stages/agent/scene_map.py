@@ -114,13 +114,20 @@ class SceneMap:
         self.obstacles = body.obstacles
         self._named: Counter[str] = Counter()
         self._same_thing, self._enough = body.same_thing, body.enough
+        self._looks_at_doors = body.short_armed
 
     def know(self, before: Mapped) -> None:
-        """Believe in what somebody mapped before, the things as if one view had shown them."""
+        """Believe in what somebody mapped before, the things as if one view had shown them. That a door is open is
+        believed where none has to be looked at to be got past."""
         self.obstacles.add(before.floor)
-        keys = [self._enter(piece_seen) for piece_seen in before.floor.furniture]
+        known = (replace(piece, opened=piece.opened and not self._looks_at_doors) for piece in before.floor.furniture)
+        ajar = {piece.label for piece in before.floor.furniture if piece.opened and self._looks_at_doors}
+        seen = [piece for piece in self.furniture.values() if piece.label in ajar]
+        keys = [self._enter(piece) for piece in known]
         for number, detection in before.things:
             self.add(detection, keys[number], MAPPED)
+        for piece in seen:  # a door that stands open is no part of the furniture as it was seen
+            self._enter(piece)
 
     def sweep(self, body: Body) -> None:
         """Turn the head camera around and enter the furniture that it saw."""

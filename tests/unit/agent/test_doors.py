@@ -20,7 +20,7 @@ from scenewright.stages.agent.world.physics.doors import doored
 from scenewright.stages.agent.world.physics.eyes import HEAD, Mask, Surface
 from scenewright.stages.agent.world.physics.front_seeing import front_seen
 from scenewright.stages.agent.world.physics.fronts import Front, edges
-from scenewright.stages.agent.world.physics.looking import is_thing
+from scenewright.stages.agent.world.physics.seen import too_wide
 from scenewright.stages.kit.geometry.transforms import apply, look_at
 from scenewright.stages.kit.motion.doors import body_from_moved
 from scenewright.stages.kit.rendering.object_views import Picture
@@ -115,8 +115,8 @@ def test_how_far_it_is_open_is_felt_and_seen() -> None:
 
 
 def test_a_drawer_that_is_taken_for_a_plate_is_no_thing() -> None:
-    assert not is_thing(surface("plate", (1.5, 4.0, 0.4), (2.5, 4.4, 0.6)))
-    assert is_thing(surface("plate", (1.9, 4.0, 0.6), (2.12, 4.22, 0.62)))
+    assert too_wide(surface("plate", (1.5, 4.0, 0.4), (2.5, 4.4, 0.6)))
+    assert not too_wide(surface("plate", (1.9, 4.0, 0.6), (2.12, 4.22, 0.62)))
 
 
 def test_a_leaf_that_swung_wide_is_pushed_from_its_outer_side() -> None:

@@ -34,7 +34,7 @@ class Handling:
         self._robot.beliefs.hold(None)
         pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
         forward = front is not None and not front.slides
-        if front is not None and forward and not front.before(pose):
+        if front is not None and forward and not front.before(pose) or self._seen.taken(at):
             return False
         if take and base == self._robot.base:
             self._see_from_here(at)

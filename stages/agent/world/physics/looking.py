@@ -6,11 +6,11 @@ from itertools import product
 from math import atan2, cos, pi, sin
 
 import numpy as np
-from scenewright.stages.agent.goals import FURNITURE, THINGS
 from scenewright.stages.agent.scene_map import quarter
 from scenewright.stages.agent.senses import Base, Detection, Look, Position, Sweep
 from scenewright.stages.agent.world.physics import head
 from scenewright.stages.agent.world.physics.eyes import (
+    FIXTURE,
     HEAD,
     NEAR_BY,
     STAINED,
@@ -24,7 +24,7 @@ from scenewright.stages.agent.world.physics.eyes import (
 from scenewright.stages.agent.world.physics.fronts import PARTS, Front
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
-from scenewright.stages.agent.world.physics.seen import FOUND_WITHIN, Seen
+from scenewright.stages.agent.world.physics.seen import FOUND_WITHIN, Seen, too_wide
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -38,8 +38,6 @@ FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), 
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
 INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
 """Pitches [rad], distances and shifts aside [m] of looks into a shelf, in the order in which they are tried."""
-WIDEST = 0.5
-"""Largest width of what lies about on furniture or in it [m]; by eye."""
 PICTURE_SECONDS = 0.5
 """Time that a picture takes [s]. **Assumed.**"""
 
@@ -121,8 +119,10 @@ class Looking:
         self._count_missed()
         self.looked_near = (self._robot.base, at) if close else None
         surfaces = [s for s in surfaces if not self._robot.in_hand(s.middle[None])[0]]
-        surfaces_near = [s for s in fuse(surfaces) if _matters(s) and self._seen.belongs(s, at, piece, close)]
-        self._seen.keep(surfaces_near, at, piece, close)
+        near = [s for s in fuse(surfaces) if not too_wide(s) or s.label == FIXTURE]
+        near = [s for s in near if self._seen.belongs(s, at, piece, close)]
+        self._seen.keep(near, at, piece, close)
+        surfaces_near = [s for s in near if s.label != FIXTURE]
         return Look(tuple(self._detection(s, sector, close, at) for s in surfaces_near), sector, close)
 
     def _count_missed(self) -> None:
@@ -235,16 +235,6 @@ class Looking:
         return (
             None if thing_in_hand is None else Detection(thing_in_hand.label, position, thing_in_hand.color, None, 0.04)
         )
-
-
-def is_thing(surface: Surface) -> bool:
-    """Whether a surface is small enough for a thing: what is wider is of furniture, whatever its mask says."""
-    return float((surface.high - surface.low)[:2].max()) < WIDEST
-
-
-def _matters(surface: Surface) -> bool:
-    """Whether a surface is of a thing, or of something that the robot has no word for and that is in the way."""
-    return is_thing(surface) or surface.label not in (*THINGS, *FURNITURE)
 
 
 def _things(masks: list[Mask]) -> list[Mask]:

@@ -6,12 +6,12 @@ Two sources: the boxes of an apartment (`apartment_room.py`), and a true scene o
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
 from scenewright.schemas.apartment import Apartment, Furniture, Thing
+from scenewright.stages.agent.world.physics.eyes import FIXTURE
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 
@@ -31,8 +31,8 @@ class Room(ABC):
 
     parts: dict[str, str]
     """What moves of furniture -> its class, handles included."""
-    fixtures: Mapping[str, str] = {}
-    """What stands in a room and is neither furniture that the robot goes to nor a thing -> its class."""
+    fixtures: tuple[str, ...] = ()
+    """What stands in a room and is neither furniture that the robot goes to nor a thing."""
     named: dict[int, str]
     """Instance number in a picture -> name; walls and floors are 0."""
 
@@ -70,7 +70,9 @@ class Room(ABC):
     def label(self, name: str) -> str:
         """Return the class by which the eyes name a thing, a part or a fixture; empty for all else."""
         thing = self.things.get(name)
-        return self.parts.get(name, "") or (thing.label if thing is not None else self.fixtures.get(name, ""))
+        if thing is not None:
+            return thing.label
+        return FIXTURE if name in self.fixtures else self.parts.get(name, "")
 
     def gap(self, piece: Furniture, x: float, y: float) -> float:
         """Return the free distance [m] of a point from a piece of furniture."""

@@ -53,11 +53,11 @@ class SceneRoom(Room):
             part: "door" if joint.type == "revolute" else "drawer" for part, (_, joint) in self._fronts.items()
         }
         self.parts |= {f"{part}__handle": "handle" for part in self._fronts}
-        self.fixtures = {
-            name: record.class_name.replace("_", " ")
+        self.fixtures = tuple(
+            name
             for name, record in records.items()
             if record.class_name not in SHELL and name not in self.furniture and name not in self.things
-        }
+        )
         named = [*self.furniture, *self.things, *self.fixtures, *self.parts]
         self._number = {name: number for number, name in enumerate(named, 1)}
         self.named = {number: name for name, number in self._number.items()}

@@ -11,7 +11,7 @@ from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 from scenewright.stages.agent.world.physics import head
 from scenewright.stages.agent.world.physics.beliefs import Believed
-from scenewright.stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
+from scenewright.stages.agent.world.physics.eyes import FIXTURE, OVERLAP, Surface, overlap
 from scenewright.stages.agent.world.physics.front_seeing import open_shelf
 from scenewright.stages.agent.world.physics.fronts import OF_EITHER, WITH_DRAWERS, WITH_LEAVES, Front, footprint
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
@@ -27,6 +27,8 @@ NEARER = 0.08
 """The folded elbow goes over a drawer: the base stands so much nearer to it than to furniture [m]."""
 BESIDE_PART = 0.06
 """What the head sees so near to a leaf or a drawer is of it [m]."""
+WIDEST = 0.5
+"""Largest width of what lies about on furniture or in it [m]; by eye."""
 AROUND = 1.4
 """What is farther from the base does not matter to the arm [m]."""
 COMFORT = 4.5
@@ -216,6 +218,10 @@ class Seen:
                 boxes[f"thing_{number}"] = (low, high)
         return boxes
 
+    def taken(self, at: Position) -> bool:
+        """Whether something stands at a position that is no thing and on which nothing is put."""
+        return any(_covers(surface, at) and surface.label == FIXTURE for surface in self.surfaces)
+
     def beside_on(self, at: Position) -> tuple[str, ...]:
         """Return the names, as of `boxes`, of what lies on the thing that covers a position."""
         carriers = [s for s in self.surfaces if _covers(s, at)]
@@ -236,6 +242,11 @@ class Seen:
         if piece is None:
             return at[2]
         return self.pieces[piece].top
+
+
+def too_wide(surface: Surface) -> bool:
+    """Whether a surface is too wide for a thing: it is of furniture, whatever its mask says."""
+    return float((surface.high - surface.low)[:2].max()) >= WIDEST
 
 
 def _covers(surface: Surface, at: Sequence[float] | np.ndarray) -> bool:
