@@ -114,14 +114,15 @@ class SceneMap:
         self.obstacles = body.obstacles
         self._named: Counter[str] = Counter()
         self._same_thing, self._enough = body.same_thing, body.enough
-        self._looks_at_doors = body.short_armed
+        self._body = body
 
     def know(self, before: Mapped) -> None:
         """Believe in what somebody mapped before, the things as if one view had shown them. That a door is open is
         believed where none has to be looked at to be got past."""
         self.obstacles.add(before.floor)
-        known = (replace(piece, opened=piece.opened and not self._looks_at_doors) for piece in before.floor.furniture)
-        ajar = {piece.label for piece in before.floor.furniture if piece.opened and self._looks_at_doors}
+        looks = self._body.short_armed
+        known = (replace(piece, opened=piece.opened and not looks) for piece in before.floor.furniture)
+        ajar = {piece.label for piece in before.floor.furniture if piece.opened and looks}
         seen = [piece for piece in self.furniture.values() if piece.label in ajar]
         keys = [self._enter(piece) for piece in known]
         for number, detection in before.things:

@@ -115,8 +115,9 @@ class Handling:
         piece = self._seen.piece_at(at)
         measured = self._seen.pieces[piece].measured_top if piece is not None else None
         front = self._seen.front_at(surface.middle)
-        if front is not None:  # several fronts have several levels, of which one was measured
-            measured = front.floor if front.alone or _near(front.floor, surface) else None
+        if front is not None:  # a shelf, and several fronts, have several levels, of which one was measured
+            one = front.alone and not front.leafless
+            measured = front.floor if one or _near(front.floor, surface) else None
         floor = 0.0 if at[2] < FLOOR else float(surface.low[2]) if measured is None else measured
         if front is None:
             return Target(surface, f"thing_{number}", rank, floor)

@@ -58,8 +58,6 @@ NOTHING_GRIPPED = 0.01
 """Opening of the fingers below which they hold no bar [m]."""
 PRESS, OVERSHOOT = 0.006, 0.02
 """The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
-LOW_PUSH = 0.45
-"""Nothing is pushed lower than this, but for what is lower itself [m]; by eye."""
 PUSHES = 4
 """Most pushes at one front: something may be in the way of one. By eye."""
 NOTICED = 0.1
@@ -95,8 +93,6 @@ class Pulling:
             return Felt(False, "out_of_reach")
         name = f"furniture_{number}"
         try:
-            if opening:
-                self._next(name)
             value = self._open(name, number) if opening else self._shut(name)
             self._seen.moved(name, value)
             self._check(self._seen.fronts[name], opening)
@@ -190,6 +186,7 @@ class Pulling:
 
     def _open(self, name: str, number: int) -> float:
         """Open a front; return how far it is open by the arm's joints. Raises MotionFailed."""
+        self._next(name)
         front = self._seen.fronts.get(name) or self._find(number)
         if is_open(front.joint, front.value):
             return front.value  # as it stood when it was first seen
@@ -382,7 +379,7 @@ class Pulling:
         part = joined(link_shapes(front.urdf())[joint.part])
         part.apply_translation(joint.origin)
         z0, z1 = front.panel[2:]
-        heights = (max(min(LOW_PUSH, (z0 + z1) / 2), z0), z1)
+        heights = (max(min(0.45, (z0 + z1) / 2), z0), z1)
         contacts = push_points(joint, part, np.random.default_rng(5), 4, heights, opening=end > front.value)
         values = arc_values(front.value, end)
         gap = self._robot.description.tip_overhang - PRESS
