@@ -78,6 +78,8 @@ class EpisodeFile(Model):
     """Whose errors a simulated segmenter made. Absent: those that the thesis prints."""
     robot: str = Field("panda", exclude_if=lambda name: name == "panda")
     """Name of the robot, as its description has it. Absent: the Panda, or the fast world, where there is none."""
+    room: str = Field("", exclude_if=lambda digest: not digest)
+    """Content digest of the ground truth whose room the robot lived in, in physics. Absent: apartment.json is all."""
     most_turns: int = Field(ge=1)
     end: str
     """`done`, `give_up`, `ask`; `turns`, `time`, `repeats`: a limit; `brain`: no usable answer."""

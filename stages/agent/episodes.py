@@ -103,10 +103,11 @@ def write_episode(
     segmenter: str = "",
     segmenter_errors: SegmenterName = "thesis",
     robot: str = USUAL_ROBOT,
+    room: str = "",
 ) -> AgentEpisode:
     """Run a trial and write it down. `language` says, when it is over, what was asked of a model; `segmenter` is what
     the service that was asked for masks says it is, `segmenter_errors` whose errors a simulated one made, `robot` the
-    name that its description has."""
+    name that its description has, `room` the digest of the truth whose room it was in."""
     watching = Watching()
     session, world = run_trial(setting, arm, brain, one_program=one_program, watch=watching.see)
     scored = score(setting.goals, impossible, session, world)
@@ -124,6 +125,7 @@ def write_episode(
         segmenter=segmenter,
         segmenter_errors=segmenter_errors,
         robot=robot,
+        room=room,
         most_turns=setting.limits.turns,
         end=session.end,
         said=session.words,

@@ -60,10 +60,10 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options that do not go together."""
     if not parameters.task.strip():
         raise UsageError("--task is empty", hint="say what you want, or name a built-in task")
-    if (inputs.get("scene") is None) != (inputs.get("truth") is None):
-        raise UsageError("--scene and --truth go together", hint="what the robot knows, and the room it is in")
-    if inputs.get("scene") is not None and inputs.get("world") is not None:
-        raise UsageError("--world and --scene are two rooms", hint="give one of them")
+    if inputs.get("scene") is not None and inputs.get("truth") is None:
+        raise UsageError("--scene is what the robot knows of a room", hint="give --truth, the room it is in, too")
+    if inputs.get("truth") is not None and inputs.get("world") is not None:
+        raise UsageError("--world and --truth are two rooms", hint="give one of them")
     acts = parameters.simulation == "physics"
     check_robot_acts(parameters, acts=acts, without="the fast world has no arm", hint="give --simulation physics too")
     if parameters.segmenter and parameters.simulation != "physics":
@@ -105,7 +105,7 @@ REPLAY = Stage(
     name="agent replay",
     summary="Do an episode again with the programs that its brain wrote: the same bytes, nobody is asked",
     parameters=ReplayParameters,
-    reads={"episode": AgentEpisode},
+    reads={"episode": AgentEpisode, "truth": Optionally(GroundTruth)},
     writes=AgentEpisode,
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="replay_stage",

@@ -26,6 +26,8 @@ TWICE = 0.5
 """Share of the distance of one thing within which a second detection of one look is of it as well; by eye."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
+TOP = 0.08
+"""What lies no farther than this below the top of furniture is on it [m]; by eye."""
 FLOOR, PATCH = "floor", 0.1
 """What the floor under a thing is called, and its edge [m]."""
 Region = tuple[int | str, bool]
@@ -117,13 +119,21 @@ class SceneMap:
         self.obstacles = body.obstacles
         self._named: Counter[str] = Counter()
         self._same_thing = body.same_thing
+        self._body = body
 
     def know(self, before: Mapped) -> None:
-        """Believe in what somebody mapped before, the things as if one view had shown them."""
+        """Believe in what somebody mapped before, the things as if one view had shown them. That a door is open is
+        believed where none has to be looked at to be got past."""
         self.obstacles.add(before.floor)
-        keys = [self._enter(piece_seen) for piece_seen in before.floor.furniture]
+        looks = self._body.short_armed
+        known = (replace(piece, opened=piece.opened and not looks) for piece in before.floor.furniture)
+        ajar = {piece.label for piece in before.floor.furniture if piece.opened and looks}
+        seen = [piece for piece in self.furniture.values() if piece.label in ajar]
+        keys = [self._enter(piece) for piece in known]
         for number, detection in before.things:
             self.add(detection, keys[number], MAPPED)
+        for piece in seen:  # a door that stands open is no part of the furniture as it was seen
+            self._enter(piece)
 
     def sweep(self, body: Body) -> None:
         """Turn the head camera around and enter the furniture that it saw."""
@@ -223,11 +233,15 @@ class SceneMap:
         """Return a thing or piece of furniture as programs see it."""
         if key in self.furniture:
             piece = self.furniture[key]
-            return SceneObject(key, piece.label, door=piece.door, opened=piece.opened)
+            return SceneObject(key, piece.label, door=piece.door, opened=piece.opened, top=piece.top, more=piece.more)
         item = self.items[key]
         doubt, ahead = (item.doubt, min(item.margin, ENOUGH)) if self.careful else ("", 0)
         on = self.carrier_of(item)
-        return SceneObject(key, item.label, item.place, item.color, item.used, on=on, doubt=doubt, ahead=ahead)
+        under = self.furniture.get(item.place)
+        above = under is not None and under.top and item.position[2] > under.height - TOP
+        return SceneObject(
+            key, item.label, item.place, item.color, item.used, top=above, on=on, doubt=doubt, ahead=ahead
+        )
 
     def global_map(self) -> ObjectMap:
         """Return the furniture."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from scenewright.schemas.apartment import Apartment
@@ -43,6 +44,8 @@ class Setting:
     world: WorldName = "fast"
     known: Apartment | None = None
     """What was mapped of it before the robot came, as far as it is right."""
+    room: Path | None = None
+    """Folder of the true scene that `apartment` describes: in physics the robot lives in its bodies as they are."""
     segmenter: str = ""
     """Address of the segmentation service that the eyes ask in physics; empty: the oracle with errors."""
     robot: str = USUAL_ROBOT
@@ -64,14 +67,18 @@ def open_world(setting: Setting, arm: str) -> World:
     """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
     if setting.world == "physics":
-        from scenewright.stages.agent.world.physics.body import PhysicsBody  # heavy: pybullet and Open3D
+        from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom  # heavy: pybullet and Open3D
+        from scenewright.stages.agent.world.physics.body import PhysicsBody
+        from scenewright.stages.agent.world.physics.scene_room import SceneRoom
 
         segmenter = None
         if setting.segmenter:
             from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter
 
             segmenter = AskedSegmenter(setting.segmenter, setting.seed, (*THINGS, *FURNITURE))
-        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed, segmenter, setting.robot)
+        apartment = setting.apartment
+        room = ApartmentRoom(apartment) if setting.room is None else SceneRoom(setting.room, apartment)
+        return PhysicsBody(room, sought(setting.goals), rates, setting.seed, segmenter, setting.robot)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 
 

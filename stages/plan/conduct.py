@@ -15,9 +15,9 @@ from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import forward
 from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
 from scenewright.stages.kit.motion.segments import Segment, whole_body
+from scenewright.stages.kit.simulation.carriers import NOTHING, carrier
 from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.plan.action import MotionRequest, action_named
-from scenewright.stages.plan.carriers import NOTHING, carrier
 from scenewright.stages.plan.correspondence import match_joint
 from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Eyes, Room

@@ -15,6 +15,7 @@ from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.scene_map import SceneMap, classes_not_of
 from scenewright.stages.agent.senses import Base, Detection, SeenFurniture, Sweep
 from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.beliefs import Beliefs
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.eyes import Surface, fuse
@@ -56,7 +57,7 @@ def table(x: float, width: float) -> SeenFurniture:
 
 @pytest.fixture
 def body() -> Iterator[PhysicsBody]:
-    made = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3)
+    made = PhysicsBody(ApartmentRoom(APARTMENT), ("apple", "plate"), NO_ERRORS, 3)
     yield made
     made.close()
 
@@ -81,7 +82,7 @@ def test_eyes_measure_and_the_hand_holds_by_contact(body: PhysicsBody) -> None:
 
 @pytest.mark.parametrize("robot", ["ur5e", "xarm7"])
 def test_another_arm_looks_takes_and_puts_down(robot: str) -> None:
-    other = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3, robot=robot)
+    other = PhysicsBody(ApartmentRoom(APARTMENT), ("apple", "plate"), NO_ERRORS, 3, robot=robot)
     try:
         other.sweep()
         seen = {d.label: d for d in other.look(ABOVE, close=False).detections}
@@ -137,7 +138,7 @@ def test_what_cannot_be_done_says_why_with_numbers(body: PhysicsBody) -> None:
 def test_a_world_is_its_seed() -> None:
     looks = []
     for _ in range(2):
-        made = PhysicsBody(APARTMENT, ("apple",), Rates(), 5)
+        made = PhysicsBody(ApartmentRoom(APARTMENT), ("apple",), Rates(), 5)
         made.sweep()
         looks.append((made.look(ABOVE, close=False), made.look((2.0, 2.3, 0.76), close=True)))
         made.close()
@@ -218,7 +219,7 @@ def test_who_stands_too_near_first_goes_away() -> None:
 def test_what_is_put_into_a_box_does_not_drag_it_along() -> None:
     box = Thing(name="fruit-box_0", label="fruit box", on="table_0", at=(2.3, 2.35), carries=True, radius=0.13)
     apartment = APARTMENT.model_copy(update={"things": (THINGS[0], box)})
-    body = PhysicsBody(apartment, ("apple", "fruit box"), NO_ERRORS, 3)
+    body = PhysicsBody(ApartmentRoom(apartment), ("apple", "fruit box"), NO_ERRORS, 3)
     body.sweep()
     seen = {d.label: d for d in body.look(ABOVE, close=False).detections}
     x, y, z = seen["fruit box"].position

@@ -18,6 +18,7 @@ from scenewright.stages.agent.goals import THINGS as THINGS_KNOWN
 from scenewright.stages.agent.parameters import ReplayParameters, RunParameters, check_run
 from scenewright.stages.agent.segmenter_identity import versions
 from scenewright.stages.agent.world.physics import looking
+from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter, word_of
 from scenewright.stages.kit.progress import SilentProgress
@@ -96,7 +97,8 @@ def test_the_robot_sees_by_the_masks_and_by_nothing_true(address: str, monkeypat
 
     take = looking.take
     monkeypatch.setattr(looking, "take", untold)
-    body = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3, AskedSegmenter(address, 3, KNOWN))
+    asked = AskedSegmenter(address, 3, KNOWN)
+    body = PhysicsBody(ApartmentRoom(APARTMENT), ("apple", "plate"), NO_ERRORS, 3, asked)
     try:
         tables = [piece for piece in body.sweep().furniture if piece.label == "table"]
         assert any(np.allclose(piece.centre, TABLE.centre, atol=0.08) for piece in tables)

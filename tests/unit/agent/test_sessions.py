@@ -359,9 +359,10 @@ def test_evaluation_counts_and_options_are_checked(tmp_path: Path) -> None:
     for wrong in ({"task": " "}, {"brain": "language"}, {"language": "openai"}):
         with pytest.raises(UsageError):
             check_run(RunParameters.model_validate(wrong), {})
-    for given in ({"scene": 1}, {"truth": 1}, {"scene": 1, "truth": 1, "world": 1}):
+    for given in ({"scene": 1}, {"truth": 1, "world": 1}, {"scene": 1, "truth": 1, "world": 1}):
         with pytest.raises(UsageError):
             check_run(RunParameters(), given)
+    check_run(RunParameters(), {"truth": 1})
 
 
 def test_what_may_be_of_either_class_is_brought_where_both_are_wanted() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scenewright.schemas.apartment import Apartment, Furniture
+from scenewright.schemas.apartment import Furniture
 from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
 from scenewright.stages.agent.world.events import Event
 from scenewright.stages.agent.world.failures import Rates
@@ -26,7 +26,7 @@ CLEARANCE = 2.9
 
 
 class PhysicsBody:
-    """One episode's world in pybullet. `sought`: classes that the eyes are asked for. `close` it.
+    """One episode's world in pybullet: a robot in a room. `sought`: classes that the eyes are asked for. `close` it.
 
     Where the masks are a `segmenter`'s, no error of the eyes is drawn: they are its own.
     """
@@ -35,7 +35,7 @@ class PhysicsBody:
 
     def __init__(
         self,
-        apartment: Apartment,
+        room: Room,
         sought: tuple[str, ...],
         rates: Rates,
         seed: int,
@@ -43,7 +43,7 @@ class PhysicsBody:
         robot: str = USUAL_ROBOT,
     ) -> None:
         rates = rates if segmenter is None else replace(rates, feedback=0.0)
-        self.apartment, self._room = apartment, Room(apartment)
+        self.apartment, self._room = room.apartment, room
         self._robot = RobotInRoom(self._room, rates, seed, robot)
         self._asked = segmenter
         eyes = segmenter or RoomSegmenter(self._room, SegmenterErrors(rates.eyes, self._robot.luck, sought))

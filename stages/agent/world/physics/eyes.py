@@ -19,6 +19,8 @@ WRIST = Camera(width=240, height=180, fx=175.0, fy=175.0, cx=119.5, cy=89.5)
 """Intrinsics of the wrist camera."""
 NEAR_BY = Camera(width=240, height=180, fx=350.0, fy=350.0, cx=119.5, cy=89.5)
 """The middle of the wrist camera's full resolution, of which looks at a whole surface take every second pixel."""
+FIXTURE = "fixture"
+"""What an oracle calls what stands on furniture or hangs on walls and is no thing: it is in the way."""
 LEAST_POINTS = 16
 """Least points of an object (ConceptGraphs)."""
 VOXEL, OVERLAP = 0.025, 0.5

@@ -20,7 +20,7 @@ class RoomSegmenter(SimulatedSegmenter):
     def masks(self, picture: Picture, map_from_camera: np.ndarray, region: object) -> list[Mask]:
         """Return the masks of a picture."""
         names = {int(number): self._room.named.get(int(number), "") for number in np.unique(picture.instance)}
-        owners = {number: name.split("__")[0] for number, name in names.items()}  # a door is of its furniture
+        owners = {number: self._room.owner(name) for number, name in names.items()}
         furniture = [
             Mask(piece.label, np.isin(picture.instance, [number for number, owner in owners.items() if owner == name]))
             for name, piece in self._room.furniture.items()
@@ -30,10 +30,9 @@ class RoomSegmenter(SimulatedSegmenter):
 
 
 def shown_in(room: Room) -> dict[int, Shown]:
-    """Return the things and parts of furniture of a room by their instance numbers."""
-    labels = {name: thing.label for name, thing in room.things.items()} | room.parts
+    """Return the things, fixtures and parts of furniture of a room by their instance numbers."""
     return {
-        number: Shown(name, labels[name], room.moved.get(name, 0))
+        number: Shown(name, room.label(name), room.moved.get(name, 0))
         for number, name in room.named.items()
-        if name in labels
+        if room.label(name)
     }
