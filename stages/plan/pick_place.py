@@ -17,7 +17,7 @@ from scenewright.stages.kit.motion.grasps import Grasp, narrowest_width, sample_
 from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
-from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements
+from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements, untaken
 from scenewright.stages.plan.rim_grasps import rim_grasps
 from scenewright.stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
 from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
@@ -34,7 +34,8 @@ FRICTION_USED = 0.3
 """Half of the friction **assumed** of rubber on household things: grasps that ask for no more are tried first, as what
 is held is carried with starts and stops."""
 LOW_LIFT, BACK_OUT = 0.012, (0.25, 0.15)
-"""How far a thing is lifted where there is no room for more, and how far it then goes back out [m]; by eye."""
+"""How far a thing is lifted where there is no room for more, and how far it then goes back out [m]; by eye. Under a
+cover that is nearer still it slides out."""
 STEEP = 1.2
 """A hand that came so steeply goes back up, not out [rad]."""
 PALM_BEHIND, HAND_END = 0.04, 0.11
@@ -280,6 +281,8 @@ def _try_pick(
     lifted = _lifted(model, base, arm, world_from_tool, grasp.pitch > STEEP, off, out, tally)
     if lifted is None:
         return None
+    if not laden and not in_hand.free(base, lifted[-1], tally):
+        return None  # slid out, it stands on its support still
     folded = lifted[-1] if laden else in_hand.folded(base, lifted[-1], tally)
     if folded is None:
         return None
@@ -321,7 +324,7 @@ def _lifted(
     up where it came `steep`; a laden one is drawn in level. None where nothing is free."""
     item = out.checker.query.carried
     laden = item is not None and model.laden(item)
-    for lift in (RAISE,) if laden else (LIFT, LOW_LIFT):
+    for lift in (RAISE,) if laden else (LIFT, LOW_LIFT, 0.0):
         goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
         up = off.line(base, arm, goal, tally)
         if up is None:
@@ -367,7 +370,8 @@ def plan_place(
     """
     assert state.tool_from_item is not None
     on_tray = model.records[target].carriable
-    places = sample_placements(model, item, target, door, random, 4 * PLACES if on_tray else PLACES)
+    drawn = sample_placements(model, item, target, door, random, 4 * PLACES if on_tray else PLACES)
+    places = untaken(model, item, target, drawn) or drawn  # what takes them up is told by the attempts
     if not places and preferred is None:
         regions = place_regions(model, item, target, door)
         raise MotionFailed(

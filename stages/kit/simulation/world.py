@@ -84,6 +84,7 @@ class PhysicsWorld:
         self.stepped = 0
         """`revision` of the last time step."""
         self._base_from_inertial: dict[int, np.ndarray] = {}
+        self._anchored = False
         self.time = 0.0
         engine.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
         engine.setPhysicsEngineParameter(
@@ -275,14 +276,18 @@ class PhysicsWorld:
                     body.body_id, -1, activationState=engine.ACTIVATION_STATE_WAKE_UP, physicsClientId=self.client
                 )
 
-    def anchor_friction(self) -> None:
-        """Let what sticks by friction stay where it sticks. Friction solved for speeds alone lets things creep on a
-        carrier that moves for long: centimetres in 20 s on a tray. What pulls harder than friction holds still slides.
+    def anchor_friction(self, anchored: bool = True) -> None:
+        """Let what sticks by friction stay where it sticks, or no longer. Friction solved for speeds alone lets things
+        creep on a carrier that moves for long: centimetres in 20 s on a tray. What pulls harder than friction holds
+        still slides. A finger that opens takes along what is anchored to it: only what is carried is to be.
         """
+        if anchored == self._anchored:
+            return
+        self._anchored = anchored
         for body in self.bodies.values():
             if body.record.movable:
                 for link in (-1, *body.links.values()):
-                    engine.changeDynamics(body.body_id, link, frictionAnchor=1, physicsClientId=self.client)
+                    engine.changeDynamics(body.body_id, link, frictionAnchor=int(anchored), physicsClientId=self.client)
 
     def settle(self, seconds: float = 1.0) -> dict[str, float]:
         """Let the world fall for some simulated seconds; return how far each movable body moved [m]."""

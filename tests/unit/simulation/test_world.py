@@ -110,3 +110,15 @@ def test_anchored_friction_is_still_friction(tmp_path: Path, slope: float, slide
         engine.setGravity(*gravity, physicsClientId=world.client)
         moved = world.settle(1.0)["bottle_1"]
     assert moved > 0.1 if slides else moved < 1e-3
+
+
+def test_friction_that_is_anchored_no_longer_is_as_it_was_before(tmp_path: Path) -> None:
+    write_scene(tmp_path, [floor(), bottle(0.0, 0.0, 0.0, "floor_1", name="bottle_1")])
+    moved = []
+    for anchors in ((), (True, False), (True,)):
+        with load_scene(tmp_path) as world:
+            for anchored in anchors:
+                world.anchor_friction(anchored)
+            engine.setGravity(1.4, 0.0, -9.7, physicsClientId=world.client)
+            moved.append(world.settle(1.0)["bottle_1"])
+    assert moved[0] == moved[1] != moved[2]
