@@ -216,17 +216,8 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> Tries:
     monkeypatch.setattr(conduct_module, "refine_action", refine)
     monkeypatch.setattr(conduct_module, "grasp_style", lambda *_: "any")
     physical = SimpleNamespace(action=-1, held=None)
-    return Tries(
-        SimpleNamespace(snapshot=lambda: None),
-        Room({}, {}, {}),
-        physical,
-        {},
-        {},
-        BUDGETS,
-        np.random.default_rng(0),
-        True,
-        3,
-    )  # type: ignore[arg-type]
+    model = SimpleNamespace(snapshot=lambda: "before")
+    return Tries(model, Room({}, {}, {}), physical, {}, {}, BUDGETS, np.random.default_rng(0), True, 3)  # type: ignore[arg-type]
 
 
 CLOSE, PLACE = act("close", "hinge"), act("place", "cup", "shelf")
