@@ -139,6 +139,7 @@ def execute(
     observed: dict[int, TreeState] = {}
     anew: dict[int, TreeState] = {}
     with load_scene(root) as world:
+        world.anchor_friction()
         start = Configuration(order.state.base, order.state.arm, model.description.opening)
         physical = _robot(world, model, start, parameters, context)
         failures = _start_failures(physical)

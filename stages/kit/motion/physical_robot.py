@@ -158,7 +158,7 @@ class PhysicalRobot:
         """Close the fingers on an item. Raises MotionFailed `grasp_lost` when not both of them press on it."""
         description = self.description
         self.robot.finger_force = description.firm_finger_force if firm else description.finger_force
-        if firm:
+        if self.world.anchored:
             self.world.anchor_friction()
         self._opening = 0.0
         self.wait(GRIP_SECONDS)
@@ -190,7 +190,8 @@ class PhysicalRobot:
 
     def release(self) -> None:
         """Open the fingers and let the item come to rest."""
-        self.world.anchor_friction(False)
+        if self.held is not None:
+            self.world.loosen(self.held)
         self.held = None
         self.robot.finger_force = self.description.finger_force
         self._opening = self.description.opening

@@ -9,28 +9,21 @@ from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
 from scenewright.stages.kit.simulation.robot_description import load_robot
 
 
-@pytest.fixture
-def anchored() -> list[bool]:
-    """What the world was told of friction, one after the other."""
-    return []
-
-
-@pytest.fixture
-def robot(anchored: list[bool], monkeypatch: pytest.MonkeyPatch) -> PhysicalRobot:
+@pytest.mark.parametrize("anchored", [True, False])
+def test_what_is_let_go_is_loosened_and_anchored_again_before_the_next_grasp(
+    monkeypatch: pytest.MonkeyPatch, anchored: bool
+) -> None:
+    """A finger that opens would take along what is anchored to it; where nothing is anchored nothing becomes so."""
+    told: list[str] = []
     robot = PhysicalRobot.__new__(PhysicalRobot)
-    robot.world = SimpleNamespace(anchor_friction=lambda on=True: anchored.append(on))  # type: ignore[assignment]
+    robot.world = SimpleNamespace(  # type: ignore[assignment]
+        anchored=anchored, anchor_friction=lambda: told.append("anchor"), loosen=lambda name: told.append(name)
+    )
     robot.robot = SimpleNamespace(grasps=lambda item: True, finger_force=0.0)  # type: ignore[assignment]
     robot.description, robot.held = load_robot("panda"), None
-    monkeypatch.setattr(robot, "wait", lambda seconds: None)
+    monkeypatch.setattr(robot, "wait", lambda seconds: told.append("wait"))
     monkeypatch.setattr(robot, "held_pose", lambda: None)
-    return robot
-
-
-@pytest.mark.parametrize(("firm", "told"), [(True, [True, False]), (False, [False])])
-def test_friction_is_anchored_while_a_load_is_carried(
-    robot: PhysicalRobot, anchored: list[bool], firm: bool, told: list[bool]
-) -> None:
-    """A finger that opens would take along what is anchored to it."""
-    robot.grasp("cup_5", firm=firm)
+    robot.grasp("cup_5")
     robot.release()
-    assert anchored == told and robot.held is None
+    robot.release()  # nothing is held any more
+    assert told == [*(["anchor"] if anchored else []), "wait", "cup_5", "wait", "wait"] and robot.held is None
