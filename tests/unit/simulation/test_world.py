@@ -121,7 +121,10 @@ def test_what_is_loosened_is_as_if_it_had_never_been_anchored(tmp_path: Path) ->
                 world.anchor_friction()
             world.settle(0.2)  # the engine remembers what touches meanwhile
             if loosened:
+                body = world.bodies["bottle_1"].body_id
+                assert world.contacts(body)
                 world.loosen("bottle_1")
+                assert bool(world.contacts(body)) != anchored  # forgotten, and found anew by the next step
             engine.setGravity(1.4, 0.0, -9.7, physicsClientId=world.client)
             return world.settle(1.0)["bottle_1"]
 
