@@ -278,7 +278,8 @@ def _try_pick(
         arm_planner.under(carrying(item, tool_from_item, model.links(item), depths))
         for depths in (allowed_depths, within, {})
     )
-    lifted = _lifted(model, base, arm, world_from_tool, grasp.pitch > STEEP, off, out, tally)
+    lifts = (RAISE,) if laden else _lifts(model, item, source)
+    lifted = _lifted(model, base, arm, world_from_tool, lifts, grasp.pitch > STEEP, off, out, tally)
     if lifted is None:
         return None
     if not laden and not in_hand.free(base, lifted[-1], tally):
@@ -315,16 +316,18 @@ def _lifted(
     base: np.ndarray,
     arm: np.ndarray,
     world_from_tool: np.ndarray,
+    lifts: tuple[float, ...],
     steep: bool,
     off: ArmPlanner,
     out: ArmPlanner,
     tally: Tally,
 ) -> np.ndarray | None:
-    """Return arm values (K, J) up `off` what a thing in the hand stands on, and `out` the way the hand came, or further
-    up where it came `steep`; a laden one is drawn in level. None where nothing is free."""
+    """Return arm values (K, J) by the first of the `lifts` [m] that serves up `off` what a thing in the hand stands on,
+    and `out` the way the hand came, or further up where it came `steep`; a laden one is drawn in level. None where
+    nothing is free."""
     item = out.checker.query.carried
     laden = item is not None and model.laden(item)
-    for lift in (RAISE,) if laden else (LIFT, LOW_LIFT, 0.0):
+    for lift in lifts:
         goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
         up = off.line(base, arm, goal, tally)
         if up is None:
@@ -338,6 +341,19 @@ def _lifted(
             if back is not None:
                 return np.concatenate([up, back[1:]])
     return None
+
+
+def _lifts(model: WorldModel, item: str, source: str) -> tuple[float, ...]:
+    """Return how far a thing may be lifted off what it stands on [m], the farthest first. A cover may be part of the
+    link on which it stands, which it touches anyway: how near that is, is asked of the region."""
+    region = model.region_under(item, source) if source in model.records else None
+    room = np.inf
+    if region is not None and region.covered:
+        points = apply(inverse(model.world_from_region(region)) @ model.pose(item), model.points(item))
+        low, high = points.min(axis=0), points.max(axis=0)
+        radius = float((high - low)[:2].max()) / 2
+        room = region.free_height((low + high)[:2] / 2, radius) - (high[2] - low[2]) - model.checker.clearance
+    return (*(lift for lift in (LIFT, LOW_LIFT) if lift < room), 0.0)
 
 
 def _opened_configuration(state: RobotState, opening: float) -> Configuration:
