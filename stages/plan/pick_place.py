@@ -19,7 +19,7 @@ from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements, untaken
 from scenewright.stages.plan.rim_grasps import rim_grasps
-from scenewright.stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
+from scenewright.stages.plan.tray_loading import GRAVITY, easiest_first, lifts_left, lifts_left_beside, load_moments
 from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
 
 APPROACH = 0.10
@@ -218,8 +218,16 @@ def plan_pick(
         for grasp in (*grasps, *others)
     }
     sideways = style == "rather_level"
-    # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge.
-    queue.sort(key=lambda entry: (not over[id(entry[1])], sideways and entry[1].pitch > max(PITCHES["level"])))
+    twist = {} if model.laden(item) else {id(grasp): _twist(model, item, grasp) for grasp in (*grasps, *others)}
+    # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge; what turns it in the
+    # fingers most is tried last.
+    queue.sort(
+        key=lambda entry: (
+            not over[id(entry[1])],
+            sideways and entry[1].pitch > max(PITCHES["level"]),
+            twist.get(id(entry[1]), 0.0),
+        )
+    )
     if preferred is not None:
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     attempts = (_try_pick(model, state, item, source, at, grasp, arm_planner, tally) for at, grasp in queue)
@@ -228,6 +236,14 @@ def plan_pick(
         return motion
     tally.raise_for(f"pick({item}, {source})", (item, source))
     raise AssertionError("unreachable")
+
+
+def _twist(model: WorldModel, item: str, grasp: Grasp) -> float:
+    """Return the most that a thing's weight turns it about the line between the fingers, in tenths [N m]: pads resist
+    that by friction alone, however the hand is turned on its way."""
+    tool_from_middle = inverse(model.pose(item) @ grasp.body_from_tool) @ model.world.center_of_mass(item)
+    lever = float(np.hypot(tool_from_middle[0, 3], tool_from_middle[2, 3]))
+    return round(GRAVITY * model.records[item].mass * lever, 1)
 
 
 def _first_motion(attempts: Iterator[Manipulation | MotionFailed | None], searches: int) -> Manipulation | None:
