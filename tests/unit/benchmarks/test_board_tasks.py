@@ -283,5 +283,5 @@ def test_where_the_map_is_the_true_room_a_task_is_asked_for_as_it_is(
     assert {(record.status, record.success, record.failure) for record in records} == {
         ("planned", False, running.SOMETHING_ELSE)
     }
-    (of_moves,) = [plan_true_rooms.of_kind("move", plan_true_rooms.RoomTasks(tuple(records)))]
+    of_moves = plan_true_rooms.of_kind("move", plan_true_rooms.RoomTasks(tuple(records)))
     assert of_moves is not None and {record.kind for record in of_moves.tasks} == {"move"}
