@@ -142,7 +142,8 @@ class Conduct:
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
                 further = put_there_later(name, arguments, following)
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style, further=further)
-                looks_again = self.eyes is not None and self.eyes.again
+                # eyes may have erred from afar, and what is held turns in the fingers on the way
+                looks_again = state.holding is not None or (self.eyes is not None and self.eyes.again)
                 before = self.model.snapshot() if looks_again else None
                 steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:
