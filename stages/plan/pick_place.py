@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -18,7 +19,6 @@ from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
 from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements, untaken
-from scenewright.stages.plan.rim_grasps import rim_grasps
 from scenewright.stages.plan.tray_loading import GRAVITY, easiest_first, lifts_left, lifts_left_beside, load_moments
 from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
 

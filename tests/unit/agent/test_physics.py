@@ -20,7 +20,7 @@ from scenewright.stages.agent.world.physics.beliefs import Beliefs
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.eyes import Surface, fuse
 from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, Jaws, antipodal_grasps, within_reach
-from scenewright.stages.agent.world.physics.hands import Target, whole_box
+from scenewright.stages.agent.world.physics.hands import Target, grasps_of, whole_box
 from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
@@ -154,6 +154,24 @@ def test_grasps_come_from_above_first_and_across_the_narrow_side() -> None:
     assert all(pose[2, 3] > 0.004 for pose in grasps)
     wide = random.uniform(-0.08, 0.08, (4000, 3))
     assert antipodal_grasps(wide, np.tile([0.0, 1.0, 0.0], (4000, 1)), JAWS, floor=-0.08) == []
+
+
+def test_what_is_too_wide_for_the_fingers_is_taken_by_its_rim() -> None:
+    """A bowl of 18 cm, seen from above: the inside of its wall, the outside towards the robot, and its floor."""
+    random = np.random.default_rng(2)
+    angle = random.uniform(-np.pi, np.pi, 6000)
+    wall = np.column_stack([0.09 * np.cos(angle), 0.09 * np.sin(angle), random.uniform(0.0, 0.07, 6000)])
+    wall[:, :2] *= random.choice([0.96, 1.0], 6000)[:, None]
+    low = random.uniform(-0.06, 0.06, (2000, 3)) * (1, 1, 0)
+    points = np.concatenate([wall, low]) + random.normal(0, 0.001, (8000, 3)) + (1.0, 0.0, 0.75)
+    bowl = Surface("bowl", points, np.tile([0.0, 0.0, 1.0], (8000, 1)), "white", 0.0, 1)
+    grasps = grasps_of(Target(bowl, "bowl", 0, 0.75), np.array([0.4, 0.0, 0.0]), JAWS)
+    assert len(grasps) > 8
+    for pose in grasps:
+        assert pose[2, 2] < -0.99, "from above"
+        assert np.hypot(*(pose[:2, 3] - (1.0, 0.0))) == pytest.approx(0.088, abs=0.006), "over the wall"
+    solid = Surface("book", random.uniform(-0.1, 0.1, (8000, 3)) * (1, 1, 0.1), bowl.normals, "white", 0.0, 1)
+    assert not grasps_of(Target(solid, "book", 0, -0.01), np.array([-0.6, 0.0, 0.0]), JAWS), "it has no rim"
 
 
 def test_a_level_hand_grips_what_it_saw_the_front_of_about_its_axis() -> None:

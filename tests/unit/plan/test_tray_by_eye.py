@@ -15,11 +15,11 @@ from scenewright.stages.kit.geometry.transforms import apply, inverse, transform
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.world import load_scene, read_scene_bodies
+from scenewright.stages.plan.affordances import has_rim
 from scenewright.stages.plan.camera_eyes import CameraEyes, Look
 from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Room
 from scenewright.stages.plan.pictures import RoomPictures
-from scenewright.stages.plan.rim_grasps import has_rim
 from scenewright.stages.plan.room_segmenter import room_segmenter
 from scenewright.stages.plan.world_model import WorldModel
 
