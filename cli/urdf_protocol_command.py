@@ -30,7 +30,7 @@ def urdf_protocol(
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
-    """Judge a scene by the protocol of docs/PROTOCOL.md: let go for 5 s in MuJoCo and Bullet, pairs of bodies in each
+    """Judge a scene by the protocol of docs/FORMATS.md: let go for 5 s in MuJoCo and Bullet, pairs of bodies in each
     other, joints swept, and what was kept of what was seen. Nothing that a file says is executed. Exits with 4 when a
     free body is not stable, lies in another, or a joint is blocked where it begins, or when nothing can move.
     """

@@ -1,4 +1,4 @@
-"""Ours: the thesis's contact graph with what a map of a real room asks for beside (docs/GRAPH.md)."""
+"""Ours: the thesis's contact graph with what a map of a real room asks for beside (docs/SCENES.md)."""
 
 from __future__ import annotations
 

@@ -182,12 +182,19 @@ def test_what_the_program_refuses_is_noticed(words: str) -> None:
 TYPED_IN_ORDER = [
     "index.md",
     "EDIT.md",
-    "POSES.md",
+    "LIBRARY.md",
+    "LLM3.md",
+    "LOGS.md",
+    "MAPPING.md",
+    "ROBOT.md",
+    "SCENES.md",
+    "STITCH.md",
+    "TIDY.md",
     *(f"tutorials/{page.name}" for page in ROOT.glob("docs/tutorials/*.md")),
 ]
 """Pages whose commands a reader types from the first to the last."""
 RUNS = {"outputs/demo": "demo", "outputs/room": "reconstruct"}
-"""What readers have made before: `make demo`, and the run of docs/tutorials/own_log.md."""
+"""What readers have made before: `make demo`, and the run of docs/LOGS.md."""
 
 
 @pytest.mark.parametrize("page", sorted(TYPED_IN_ORDER))

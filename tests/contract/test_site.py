@@ -41,6 +41,6 @@ def test_the_site_builds_with_strict_links(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     html = (tmp_path / "site" / "index.html").read_text()
-    assert "tutorials/own_log.html" in html
+    assert "LOGS.html" in html
     fetched = re.findall(r'(?:<script[^>]+src|<link[^>]+rel="stylesheet"[^>]+href)="(https?://[^"]+)"', html)
     assert fetched == [], "the site works without a network"

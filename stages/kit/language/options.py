@@ -19,7 +19,7 @@ class LanguageParameters(Parameters):
     language: Literal["scripted", "recorded", "openai"] = Field(
         "scripted",
         description="Who answers in place of a language model or as one: `scripted`: a stand-in of ours, no model; "
-        "`recorded`: a transcript; `openai`: any server with OpenAI's chat completions (docs/LANGUAGE.md)",
+        "`recorded`: a transcript; `openai`: any server with OpenAI's chat completions (docs/INTERPRET.md)",
     )
     model: str = Field("", description="Model that is asked, as the server calls it; recorded: empty takes the one")
     base_url: str = Field("http://127.0.0.1:8080/v1", description="Where that server answers, mostly ending with /v1")
