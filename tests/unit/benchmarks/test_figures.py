@@ -56,6 +56,15 @@ def test_a_page_of_results_begins_with_what_it_does_not_show(page: Path) -> None
     assert shown[0].startswith("**What this does not show.**")
 
 
+@pytest.mark.parametrize("page", sorted(RESULTS.glob("*.md")), ids=lambda page: page.name)
+def test_no_table_stands_before_what_its_figures_do_not_show(page: Path) -> None:
+    """Of experiments that have their page here: a page may hold several."""
+    markers = re.findall(r"<!-- (about|table|rows) (\w+)", page.read_text())
+    told = {name for kind, name in markers if kind == "about"}
+    for place, (kind, name) in enumerate(markers):
+        assert kind == "about" or name not in told or ("about", name) in markers[:place], name
+
+
 def test_every_experiment_has_one_page(experiments: dict[str, Experiment]) -> None:
     about = Counter(name for page in RESULTS.glob("*.md") for name in re.findall(r"<!-- about (\w+)", page.read_text()))
     assert about == Counter(list(experiments))
