@@ -65,6 +65,12 @@ def test_sentences_are_short(page: Path) -> None:
     assert median(map(words, prose(text))) <= MEDIAN
 
 
+@pytest.mark.parametrize("name", REFERENCE)
+def test_sentences_of_reference_are_short_outside_of_tables(name: str) -> None:
+    text = (DOCS / name).read_text()
+    assert [sentence for sentence in prose(text) if words(sentence) > LONGEST] == []
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -204,7 +204,7 @@ def test_words_do_not_contradict_the_vocabulary() -> None:
 
 def table_of_labels() -> str:
     """The table of docs/FORMATS.md: class by class, the labels that stand for it."""
-    rows = ["| class | COCO panoptic | ADE20K | everyday words |", "|---|---|---|---|"]
+    rows = ["| class | COCO panoptic | ADE20K | everyday words | PASCAL VOC |", "|---|---|---|---|---|"]
     for name in (*(entry.name for entry in VOCABULARY.classes), ""):
         cells = []
         for source in LABEL_FILES:
