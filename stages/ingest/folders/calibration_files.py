@@ -128,7 +128,8 @@ def _camera_of(document: dict[Any, Any], path: Path) -> CalibrationRecord:
         numbers = _numbers(values)
         if numbers is None:
             raise BadInput(
-                f"{path}: has neither a camera matrix nor fx, fy, cx, cy", hint="docs/LOGS.md lists the files"
+                f"{path}: has neither a camera matrix nor fx, fy, cx, cy",
+                hint="docs/FORMATS.md, Layouts of logs, lists the files",
             )
         matrix = _pinhole_matrix(numbers)
     coefficients = _numbers(
@@ -250,7 +251,9 @@ def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     try:
         numbers = [float(field) for field in re.sub(r"#.*", "", text).replace(",", " ").split()]
     except ValueError:
-        raise BadInput(f"{path}: is no calibration that is understood", hint="docs/LOGS.md lists the kinds") from None
+        raise BadInput(
+            f"{path}: is no calibration that is understood", hint="docs/FORMATS.md, Layouts of logs, lists the kinds"
+        ) from None
     if len(numbers) in (4, 8, 9) and not (len(numbers) == 9 and numbers[6:] == [0, 0, 1]):
         return FolderCalibration(_record(_pinhole_matrix(numbers[:4]), (0, 0), path, numbers[4:], "plumb_bob"))
     if len(numbers) in (9, 16):

@@ -1,4 +1,4 @@
-"""Version 1 of the segmentation protocol (docs/SEGMENTATION.md): what is said over HTTP, and how it is judged.
+"""Version 1 of the segmentation protocol (docs/FORMATS.md): what is said over HTTP, and how it is judged.
 
 Everything that comes over the wire is checked here, on both sides, and nothing of it is executed.
 """

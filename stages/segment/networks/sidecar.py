@@ -14,7 +14,7 @@ from scenewright.schemas.outside import file_toml
 Layout = Literal[
     "yolo-seg", "yolo-objectness", "yolo-end-to-end", "instances", "query-instances", "panoptic", "semantic"
 ]
-HINT = "say what goes in and what comes out with --sidecar FILE.toml (docs/SEGMENTATION.md)"
+HINT = "say what goes in and what comes out with --sidecar FILE.toml (docs/FORMATS.md, Networks in ONNX and TFLite)"
 BY_FOLDER = "run it in a script of your own and give its masks with --backend masks (docs/MASKS.md)"
 LARGEST_FILE = 2**20
 """Most bytes of a sidecar."""
@@ -98,7 +98,7 @@ INPUTS: Mapping[str, Mapping[str, Any]] = {
 
 def read_sidecar(path: Path) -> Sidecar:
     """Read a TOML sidecar. Raises BadInput when it is none, or does not name the outputs of its layout."""
-    hint = "see docs/SEGMENTATION.md"
+    hint = "see docs/FORMATS.md, Networks in ONNX and TFLite"
     try:
         values = file_toml(path, LARGEST_FILE, hint=hint)
         told = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
