@@ -117,7 +117,9 @@ def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) ->
     if parameters.record and parameters.record not in parameters.arms:
         raise UsageError(f"--record {parameters.record} is none of the arms", hint=f"--arms {parameters.record}")
     if parameters.sight != "model" and inputs.get("perception") is not None:
-        raise UsageError(f"--perception is no error model of --sight {parameters.sight}", hint="leave one of them out")
+        raise UsageError(
+            f"--perception is not an error model of --sight {parameters.sight}", hint="leave one of them out"
+        )
     if len(set(parameters.arms)) != len(parameters.arms):
         raise UsageError(f"--arms: an arm is named twice ({' '.join(parameters.arms)})", hint="name each once")
 

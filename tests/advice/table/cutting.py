@@ -36,7 +36,7 @@ def empty_recording(folder: Path) -> None:
 
 
 ROWS = [
-    goal("is no number with a category", "some slices", "6 slices, 8 cubes"),
+    goal("is not a number with a category", "some slices", "6 slices, 8 cubes"),
     goal("there is no category", "6 wedges", "6 cubes"),
     goal("are named twice", "2 slices, 3 slices", "5 slices"),
     goal("--goal: 0 ", "2 slices and 0 cubes", "2 slices"),

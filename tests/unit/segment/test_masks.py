@@ -493,9 +493,9 @@ def test_the_text_is_that_of_pycocotools() -> None:
         ({"size": [4, 5], "counts": "o" * 40 + "0"}, "more than 2.31"),
         ({"size": [4, 5], "counts": "5\x00"}, "letters that none has"),
         ({"size": [5, 4], "counts": [20]}, "4 x 5 pixels, the frame of 5 x 4"),
-        ({"counts": [20]}, "no RLE"),
-        ([[0, 0, 5, 5, 5, 0]], "no RLE"),
-        (None, "no RLE"),
+        ({"counts": [20]}, "not an RLE"),
+        ([[0, 0, 5, 5, 5, 0]], "not an RLE"),
+        (None, "not an RLE"),
     ],
 )
 def test_an_encoding_that_lies_is_refused(encoding: Any, message: str) -> None:

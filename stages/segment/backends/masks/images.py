@@ -103,6 +103,6 @@ def _checked_content(path: Path, shape: tuple[int, int]) -> bytes:
 def decode_mask(data: bytes, where: str) -> np.ndarray:
     """Return the mask (h, w) bool of a small PNG: where it is not 0. Raises BadInput, beginning with `where`."""
     if not may_be_decoded(data):
-        raise BadInput(f"{where}: its mask is no sound PNG", hint="write it again")
+        raise BadInput(f"{where}: its mask is not a sound PNG", hint="write it again")
     image = _decoded(Path(where), data)
     return (image if image.ndim == 2 else image.max(axis=2)) != 0
