@@ -205,11 +205,11 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
     "a line without end": ({"chair.obj": CUBE + "x" * (obj_reading.LONGEST_LINE + 1)}, "chair.*a line of"),
     "a length that is infinite": (
         {"chair.gltf": json.dumps(BUFFERED).replace("3}", "1e999}")},
-        "chair.*no whole number",
+        "chair.*not a whole number",
     ),
     "a view that is infinite": (
         {"chair.glb": glb(bufferViews=[{"buffer": 0, "byteLength": 123456}]).replace(b"123456", b"1e999 ")},
-        "chair.*no whole number",
+        "chair.*not a whole number",
     ),
     "nodes that share children": (
         {"chair.glb": glb(nodes=[{"children": [k + 1, k + 1]} for k in range(16)] + [{"mesh": 0}])},
