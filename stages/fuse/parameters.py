@@ -63,7 +63,7 @@ class FuseParameters(Parameters):
     )
     merge_minimum_frames: int = Field(3, ge=1, description="Shared frame segments after which two labels merge")
     instance_minimum_frames: int = Field(
-        2, ge=1, description="`ours`: frames that must see two things as one before they merge"
+        2, ge=1, description="`ours`: frames that see two things as one, more than see them as two, before these merge"
     )
     instance_threshold: float = Field(0.5, gt=0, le=1, description="m_th of eq. 2.5")
     instance_minimum_count: int = Field(10, ge=0, description="Common count above which instances merge")

@@ -45,8 +45,7 @@ def in_metres(baseline: float, where: str) -> tuple[float, str | None]:
     low, high = UNCLEAR
     if low <= length < high:
         raise BadInput(
-            f"{where}: by the calibration the eyes stand {length:.4g} apart, too far for metres: centimetres, or "
-            "millimetres?",
+            f"{where}: the calibration's baseline is {length:.4g}, too long for metres: centimetres, or millimetres?",
             hint=f"{others}, --baseline {length / 1000:.4g} if in millimetres",
         )
     return baseline / 1000, f"WARNING: baseline of {length:.4g} taken as millimetres ({others})"

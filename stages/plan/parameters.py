@@ -102,7 +102,7 @@ def check_options(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None
     if parameters.goal and parameters.task:
         raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     if parameters.stand and len(parameters.stand) != 3:
-        raise UsageError(f"--stand has {len(parameters.stand)} values", hint=STAND)
+        raise UsageError(f"--stand has {len(parameters.stand)} values, not 3", hint=STAND)
     if parameters.eyes == "true" and (parameters.segmenter or parameters.segmenter_errors != "thesis"):
         raise UsageError("with --eyes true nothing is segmented", hint="give --eyes camera too")
     if inputs.get("domain") is not None and parameters.planner != "builtin":

@@ -41,7 +41,7 @@ class PosesParameters(Parameters):
     )
     maximum_residual: float = Field(0.03, gt=0, description="Alignment: largest point-to-plane error [m]")
     maximum_uncertainty: float = Field(
-        0.05, gt=0, description="Alignment: largest standard deviation along its worst direction [m]"
+        0.05, gt=0, description="Alignment: largest uncertainty along its worst direction [m]"
     )
     maximum_brightness_difference: float = Field(
         0.1, gt=0, le=1, description="Alignment: largest RMS photometric error, as a share of the range"

@@ -91,9 +91,8 @@ class CommonParameters(Parameters):
         None,
         ge=0,
         le=4,
-        description="Run the network that finds things on this many overlapping tiles a side too (2: four of .6 of the "
-        "frame's sides): small things, at more time; 0: none (default: those of `detector`, five times slower; none of "
-        "`tflite`, `onnx`)",
+        description="Overlapping tiles a side on which the network runs too: small things, at more time; 0: "
+        "none. Default: those of `detector`; none of `tflite`, `onnx`",
     )
 
     @field_validator("backend")

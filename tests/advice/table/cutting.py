@@ -64,7 +64,7 @@ ROWS = [
     ),
     Tried(
         OPTIONS,
-        "both say what is cut",
+        "both set the object",
         f"{DEMONSTRATED} --dry-run --mesh {{cut}}/loaf.stl",
         f"{PLANNING} --dry-run --goal '6 slices' --mesh {{cut}}/loaf.stl",
     ),

@@ -228,12 +228,12 @@ def test_a_request_survives_the_wire() -> None:
 # ---- faults --------------------------------------------------------------------------------------------------------
 
 REPLY_FAULTS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
-    "no JSON": (lambda r: b"<html>", "no JSON"),
+    "no JSON": (lambda r: b"<html>", "not JSON"),
     "a list": (lambda r: [r], "not a JSON object"),
-    "no UTF-8": (lambda r: b'{"protocol": "\xff"}', "no JSON"),
+    "no UTF-8": (lambda r: b'{"protocol": "\xff"}', "not JSON"),
     "NaN": (lambda r: json.dumps(r).replace("0.75", "NaN").encode(), "NaN is not a number"),
     "infinite": (lambda r: json.dumps(r).replace("0.75", "1e999").encode(), "score inf"),
-    "deep": (lambda r: b"[" * 100_000, "no JSON"),
+    "deep": (lambda r: b"[" * 100_000, "not JSON"),
     "another protocol": (lambda r: {**r, "protocol": "scenewright-segmentation/2"}, "speaks 'scenewright-segm"),
     "bad PNG": (lambda r: {**r, "panoptic_png": base64.b64encode(b"\x89PNG\r\n\x1a\n" + b"x" * 50).decode()}, "PNG"),
     "bad base64": (lambda r: {**r, "panoptic_png": "%%%"}, "base64"),
