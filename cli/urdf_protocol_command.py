@@ -64,7 +64,7 @@ def _check_out(folder: Path) -> None:
     inside = sorted(path.name for path in folder.iterdir()) if folder.exists() else []
     others = [name for name in inside if name not in (JSON_NAME, PICTURE_NAME)]
     if others:
-        raise UsageError(f"--out {folder}: it holds {others[0]:.60}, which is no protocol", hint=hint)
+        raise UsageError(f"--out {folder}: it holds {others[0]:.60}, which is not a protocol", hint=hint)
 
 
 def _write(out: Path, folder: Path, document: dict[str, object]) -> None:

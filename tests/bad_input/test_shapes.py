@@ -110,7 +110,7 @@ def test_trees_of_a_graph_without_the_scene() -> None:
 
 
 def test_a_page_that_names_what_is_no_utf8(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="no UTF-8"):
+    with pytest.raises(BadInput, match="not UTF-8"):
         _write("<p>caf\udce9</p>", "title", (), {}, SimpleNamespace(output=tmp_path))  # type: ignore[arg-type]
     assert list(tmp_path.iterdir()) == []
 

@@ -8,7 +8,7 @@ bottom, laden or not. What a person marked (`edit mark`) is as they said; what h
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.stages.kit.formats.scene_supports import resting_height
@@ -49,6 +49,8 @@ class Mobility:
 
     movable: bool
     furniture: bool = False
+    why: str = field(default="", compare=False)
+    """In words, as a clause."""
 
 
 def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str], fixed: Collection[str]) -> Mobility:
@@ -57,17 +59,22 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
     `carriable`: classes that an arm carries; `fixed`: classes that stay although they would be furniture.
     """
     link = graph.parent_link(node.id)
-    stands = link is None or link.relation in STANDS
-    if node.node_type == "layout" or not stands:
-        return Mobility(False)
+    if node.node_type == "layout":
+        return Mobility(False, why="it bounds the room")
+    if link is not None and link.relation not in STANDS:
+        return Mobility(False, why="it hangs, and would fall")
+    is_carriable = node.class_name in carriable
     if node.mark is not None:
-        return Mobility(node.mark == "movable", node.mark == "movable" and node.class_name not in carriable)
-    if node.class_name in carriable:
-        return Mobility(True)
+        is_free = node.mark == "movable"
+        return Mobility(is_free, is_free and not is_carriable, f"a person marked it {node.mark}")
+    if is_carriable:
+        return Mobility(True, why=f"an arm carries things of class {node.class_name}")
     if link is None or link.source == SCENE_NODE:
-        return Mobility(False)
-    if node.class_name in BUILT_IN or node.class_name in fixed:
-        return Mobility(False)
+        return Mobility(False, why="nothing was found that carries it")
+    if node.class_name in fixed:
+        return Mobility(False, why=f"class {node.class_name} is among the classes to keep fixed")
+    if node.class_name in BUILT_IN:
+        return Mobility(False, why=f"class {node.class_name} is part of the building, or too heavy to push")
     if resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
-        return Mobility(False)
-    return Mobility(True, furniture=True)
+        return Mobility(False, why="it stands on no level plane within 4 cm of its bottom")
+    return Mobility(True, furniture=True, why="it is furniture and stands by its own weight")

@@ -156,7 +156,7 @@ def _judge(answer: Answer) -> None:
         content = envelope["choices"][0]["message"].get("content")
         sound = content is None or isinstance(content, str | list)
     except (ValueError, RecursionError):
-        raise TryAgain("an answer that is no JSON") from None
+        raise TryAgain("an answer that is not JSON") from None
     except (LookupError, TypeError, AttributeError):
         sound = False
     if not sound:

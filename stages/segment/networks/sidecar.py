@@ -111,7 +111,7 @@ def read_sidecar(path: Path) -> Sidecar:
     if set(sidecar.outputs) not in (set(roles), set(roles) - {"scores"}):
         raise BadInput(f"{path}: outputs are {sorted(sidecar.outputs)}, not {sorted(roles)}", hint=hint)
     if sidecar.size is not None and not all(0 < side <= 16384 for side in sidecar.size):
-        raise BadInput(f"{path}: size {sidecar.size} is no image's", hint=hint)
+        raise BadInput(f"{path}: size {sidecar.size} is not an image's", hint=hint)
     if not sidecar.scale > 0 or min(map(abs, sidecar.deviation)) == 0:
         raise BadInput(f"{path}: a scale or deviation of 0", hint=hint)
     return sidecar
