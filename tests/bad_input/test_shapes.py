@@ -33,7 +33,7 @@ def test_a_volume_of_another_shape(tmp_path: Path, case: str) -> None:
         voxel_size=0.02, truncation_distance=0.06, frames_integrated=1, segmentation="truth", entities=()
     ).write(tmp_path / "entities.json")
     np.savez(tmp_path / "volume.npz", **arrays)
-    assert load_free_space(PanopticMap(tmp_path)).distance.shape == (5, 512)
+    assert load_free_space(PanopticMap(tmp_path)).near.values.shape == (5, 512)
     arrays |= {
         "transposed": {"tsdf": arrays["tsdf"].T},
         "fewer blocks": {"weight": arrays["weight"][:4]},
