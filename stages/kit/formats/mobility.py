@@ -1,8 +1,8 @@
 """What of a scene is free to move: what an arm carries, and furniture that stands by its own weight.
 
 Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
-thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane within 4 cm of its
-bottom, laden or not. What a person marked (`edit mark`) is as they said; what hangs stays.
+thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane, laden or not.
+What a person marked (`edit mark`) is as they said; what hangs stays.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from scenewright.stages.kit.formats.scene_supports import resting_height
+from scenewright.stages.kit.formats.scene_supports import support_height
 
 STANDS = ("supports", "contains")
 BUILT_IN = frozenset(
@@ -68,6 +68,6 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
         return Mobility(False)
     if node.class_name in BUILT_IN or node.class_name in fixed:
         return Mobility(False)
-    if resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
+    if support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
         return Mobility(False)
     return Mobility(True, furniture=True)
