@@ -16,6 +16,8 @@ from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.surroundings import Convex, convex_of, near_any
 from scenewright.stages.kit.geometry.steadiness import FOOT_THICKNESS, stands_steadily
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scipy.spatial import cKDTree
+from shapely.geometry import MultiPoint
 
 LEG = 0.04
 """Edge of a leg [m]: those of chairs and tables have 3 to 6 cm; by eye."""
@@ -23,6 +25,8 @@ NEAR_GROUND = 0.10
 """Sides that end so near above the ground [m] go on to it."""
 SPACING = 0.02
 """Largest distance between the points at which is asked whether a place is taken [m]: half a leg."""
+CLOSED = 0.5
+"""Share of its outline along which the sides of a box were seen near the ground: half, from one corner."""
 DEEPER = 0.04
 """Step in which depth is added [m]."""
 DEEPEST = 0.7
@@ -116,7 +120,7 @@ def _feet(points: np.ndarray, rests_at: float, room: Room) -> Iterator[tuple[lis
     """Yield what may carry points (N, 3) at `rests_at` [m]: nothing, a bottom, legs; only where there is room."""
     yield [], ""
     low = points[points[:, 2] <= rests_at + NEAR_GROUND, :2]
-    if len(low) and np.ptp(low, axis=0).min() >= LEG:
+    if len(low) and np.ptp(low, axis=0).min() >= LEG and _enclosed(low) >= CLOSED:
         bottom = [_between(low, rests_at, rests_at + FOOT_THICKNESS)]
         if room.has_room(bottom):
             yield bottom, "a bottom"
@@ -126,6 +130,16 @@ def _feet(points: np.ndarray, rests_at: float, room: Room) -> Iterator[tuple[lis
         if legs:
             longest = max(np.ptp(leg[:, 2]) for leg in legs)
             yield legs, f"{len(legs)} legs of up to {1000 * longest:.0f} mm"
+
+
+def _enclosed(level: np.ndarray) -> float:
+    """Return the share of the outline of level points (N, 2) along which there are some: four legs stand at corners
+    alone, the sides of a box all around."""
+    outline = MultiPoint(level).convex_hull.exterior
+    along = np.arange(0.0, outline.length, SPACING)
+    places = np.array([outline.interpolate(distance).coords[0] for distance in along])
+    distance, _ = cKDTree(level).query(places)
+    return float(np.mean(distance <= LEG))
 
 
 def _between(level: np.ndarray, low: float, high: float) -> np.ndarray:

@@ -85,6 +85,26 @@ def test_a_box_gets_a_bottom() -> None:
     assert np.allclose([bottom.min(axis=0), bottom.max(axis=0)], [[-0.2, -0.15, 0], [0.2, 0.15, 0.01]], atol=1e-6)
 
 
+def test_a_chair_of_which_the_ends_of_the_legs_were_missed_gets_no_plate() -> None:
+    """A seat at 0.45 m on four legs of 4 cm that were seen down to 5 cm."""
+    legs = [
+        side
+        for x in (-0.2, 0.16)
+        for y in (-0.2, 0.16)
+        for side in (
+            ((x, x + 0.04), (y, y), (0.05, 0.45), -1),
+            ((x, x), (y, y + 0.04), (0.05, 0.45), -1),
+            ((x, x + 0.04), (y + 0.04, y + 0.04), (0.05, 0.45), 1),
+            ((x + 0.04, x + 0.04), (y, y + 0.04), (0.05, 0.45), 1),
+        )
+    ]
+    found, pieces = completed(surface(((-0.2, 0.2), (-0.2, 0.2), (0.45, 0.45), 1), *legs))
+    assert found is not None and len(pieces) == 4
+    for piece in pieces:
+        assert piece[:, 2].max() == pytest.approx(0.05, abs=0.001)
+        assert np.all(np.abs(piece[:, :2].mean(axis=0)) > 0.13), "at the ends of what was seen of the legs"
+
+
 def test_what_stands_is_left_alone() -> None:
     box = trimesh.creation.box((0.4, 0.3, 0.5)).apply_translation([0, 0, 0.25])
     found, pieces = completed(box)
