@@ -58,7 +58,7 @@ class FreeSpace:
 
     def as_arrays(self) -> dict[str, np.ndarray]:
         """Return the cells that enough frames saw through, in canonical order: block_coordinates (B, 3) int32, `free`
-        (B, 64) uint8, a bit for each of a block's 8^3 cells, x fastest, the lowest bit first, and the `edge` (1,) of a cell
+        (B, 64) uint8, a bit for each of 8^3 cells of a block, x fastest, lowest bit first, and the `edge` (1,) of one
         [m]. Blocks without such a cell are left out."""
         free = self.frames[: self.count] >= FEWEST
         kept = np.flatnonzero(free.any(axis=1))

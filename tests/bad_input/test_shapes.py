@@ -45,6 +45,25 @@ def test_a_volume_of_another_shape(tmp_path: Path, case: str) -> None:
         load_free_space(PanopticMap(tmp_path))
 
 
+@pytest.mark.parametrize("case", ["other blocks", "signed", "no edge"])
+def test_free_cells_of_another_form(tmp_path: Path, case: str) -> None:
+    arrays = {
+        "block_coordinates": np.zeros((2, 3), np.int32),
+        "free": np.zeros((2, 64), np.uint8),
+        "edge": np.array([0.08]),
+    }
+    np.savez(tmp_path / "free_space.npz", **arrays)
+    assert load_free_space(PanopticMap(tmp_path)).far.edge == 0.08
+    arrays |= {
+        "other blocks": {"free": np.zeros((2, 512), np.uint8)},
+        "signed": {"free": np.zeros((2, 64), np.int64)},
+        "no edge": {"edge": np.array([0.0])},
+    }[case]
+    np.savez(tmp_path / "free_space.npz", **arrays)
+    with pytest.raises(BadInput, match="expected"):
+        load_free_space(PanopticMap(tmp_path))
+
+
 def test_shapes_name_the_same_size_by_the_same_letter(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", points=np.zeros((4, 3)), instance=np.zeros(4, int), other=np.zeros(5))
     path = tmp_path / "a.npz"
