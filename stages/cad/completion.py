@@ -8,8 +8,7 @@ where cameras saw that nothing is, or where something else stands; so a table ge
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
 
 import numpy as np
 from scenewright.stages.cad.free_space import FreeSpace
@@ -23,10 +22,12 @@ LEG = 0.04
 """Edge of a leg [m]: those of chairs and tables have 3 to 6 cm; by eye."""
 NEAR_GROUND = 0.10
 """Sides that end so near above the ground [m] go on to it."""
-SPACING = 0.02
-"""Largest distance between the points at which is asked whether a place is taken [m]: half a leg."""
+SPACING = 0.01
+"""Largest distance between the points at which is asked whether a place is taken [m]: half a voxel of a map."""
 CLOSED = 0.5
 """Share of its outline along which the sides of a box were seen near the ground: half, from one corner."""
+FEW = 16
+"""Every so many of these points are asked first: most of what has no room has none anywhere."""
 DEEPER = 0.04
 """Step in which depth is added [m]."""
 DEEPEST = 0.7
@@ -49,6 +50,8 @@ class Room:
     """What else stands there, but for what carries the thing."""
     turn: np.ndarray
     """(3, 3): world from the frame of the thing."""
+    known: dict[tuple[tuple[float, float], float, float], bool] = field(default_factory=dict)
+    """Legs that were asked for."""
 
     def fills(self, points: np.ndarray) -> np.ndarray:
         """Return (N,) bool: points (N, 3), frame of the thing, in something else."""
@@ -57,7 +60,18 @@ class Room:
     def has_room(self, pieces: Sequence[np.ndarray]) -> bool:
         """Whether convex pieces, corners (N, 3), frame of the thing, lie neither in what was seen empty nor in
         something else."""
-        return not any(self.takes(inside_points(piece)).any() for piece in pieces)
+        for piece in pieces:
+            points = inside_points(piece)
+            if self.takes(points[::FEW]).any() or self.takes(points).any():
+                return False
+        return True
+
+    def has_leg(self, place: tuple[float, float], low: float, high: float) -> bool:
+        """Whether there is room for a leg at a place (2,) between two heights [m]; asked once."""
+        leg = (place, low, round(high, 3))
+        if leg not in self.known:
+            self.known[leg] = self.has_room([_between(np.array(place) + 0.5 * LEG * CORNERS, low, high)])
+        return self.known[leg]
 
     def takes(self, points: np.ndarray) -> np.ndarray:
         """Return (N,) bool: points (N, 3), frame of the thing, that were seen empty or lie in something else."""
@@ -156,21 +170,18 @@ def _legs(points: np.ndarray, rests_at: float, room: Room) -> list[np.ndarray]:
     middles = (cells + 0.5) * LEG
     spread = middles - middles.mean(axis=0)
     spread /= np.maximum(np.ptp(spread, axis=0), LEG)
+    ground = rests_at + FOOT_THICKNESS
 
-    @cache
-    def leg(k: int) -> np.ndarray | None:
-        """Return the leg below a cell, without a point where it is seen, None where it has no room."""
-        if lowest[k] <= rests_at + FOOT_THICKNESS:
-            return np.zeros((0, 3))
-        corners = _between(middles[k] + 0.5 * LEG * CORNERS, rests_at, lowest[k])
-        return corners if room.has_room([corners]) else None
+    def is_foot(k: int) -> bool:
+        """Whether a leg below a cell was seen, or has room."""
+        return bool(lowest[k] <= ground) or room.has_leg(tuple(middles[k].tolist()), rests_at, float(lowest[k]))
 
-    chosen = set()
-    for corner in CORNERS:
-        outwards = np.argsort(-(spread @ corner), kind="stable")
-        chosen |= {next((k for k in outwards.tolist() if leg(k) is not None), -1)}
-    legs = [corners for k in sorted(chosen - {-1}) if (corners := leg(k)) is not None]
-    return [corners for corners in legs if len(corners)]
+    def outermost(corner: np.ndarray) -> int | None:
+        """Return the cell of a foot that is farthest out towards a corner."""
+        return next(filter(is_foot, np.argsort(-(spread @ corner), kind="stable").tolist()), None)
+
+    chosen = sorted({k for corner in CORNERS if (k := outermost(corner)) is not None})
+    return [_between(middles[k] + 0.5 * LEG * CORNERS, rests_at, lowest[k]) for k in chosen if lowest[k] > ground]
 
 
 def _deepened(
