@@ -54,8 +54,8 @@ def _body(
         if not folder.is_dir():
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
         model = as_it_moved(read_model(folder), {} if replacement is None else replacement.motions)
-        if mobile.furniture and node.mark is None and "built_in" in model.recipe:
-            mobile = Mobility(False)
+        is_built_in = mobile.furniture and node.mark is None and "built_in" in model.recipe
+        mobile = Mobility(False) if is_built_in else mobile
         return BundleBody(
             name=node.id,
             class_name=node.class_name,
@@ -71,6 +71,7 @@ def _body(
             joint_values=dict(node.joints),
             held=frozenset() if replacement is None else replacement.held,
             part_colors={} if replacement is None else dict(replacement.part_colors),
+            because="held: it is built in" if is_built_in else "",
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
