@@ -143,7 +143,7 @@ def _feet(points: np.ndarray, rests_at: float, room: Room) -> Iterator[tuple[lis
         legs = _legs(upper, rests_at, room)
         if legs:
             longest = max(np.ptp(leg[:, 2]) for leg in legs)
-            yield legs, f"{len(legs)} legs of up to {1000 * longest:.0f} mm"
+            yield legs, f"{len(legs)} leg{'s' * (len(legs) > 1)} of up to {1000 * longest:.0f} mm"
 
 
 def _enclosed(level: np.ndarray) -> float:

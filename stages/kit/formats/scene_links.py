@@ -244,7 +244,8 @@ def furniture_links(
         write_obj(root / "meshes" / name / f"collision_{number}.obj", solid.vertices, solid.faces)
         collisions.append(Shape(f"meshes/{name}/collision_{number}.obj"))
     solids += [hull_or_box(corners) for corners in inferred]
-    links = BodyLinks((Link(name, mass_properties(solids, [density] * len(solids)), (visual,), tuple(collisions)),))
+    visuals = (visual, *_shown_pads(world_from_body, carried))
+    links = BodyLinks((Link(name, mass_properties(solids, [density] * len(solids)), visuals, tuple(collisions)),))
     return links.with_mass(properties.mass)
 
 
@@ -270,7 +271,7 @@ def still_mesh_links(
         frame[:3, 3] = turned[:3, :3] @ center
         collisions.append(Shape(box_size=_triple(size), link_from_shape=frame))
     collisions += _pads_of(world_from_body, carried)
-    return BodyLinks((Link(name, properties, (visual,), tuple(collisions)),))
+    return BodyLinks((Link(name, properties, (visual, *_shown_pads(world_from_body, carried)), tuple(collisions)),))
 
 
 def with_inferred(root: Path, links: BodyLinks, inferred: Sequence[np.ndarray]) -> BodyLinks:
@@ -311,6 +312,11 @@ def _pads_of(world_from_body: np.ndarray, carried: Sequence[Carried]) -> list[Sh
         frame = body_from_world @ transform_from_yaw(world_yaw, center)
         shapes.append(Shape(box_size=_triple(size), link_from_shape=frame))
     return shapes
+
+
+def _shown_pads(world_from_body: np.ndarray, carried: Sequence[Carried]) -> list[Shape]:
+    """Return the pads whose planes nobody saw, to look at."""
+    return [replace(shape, color=INFERRED) for shape in _pads_of(world_from_body, [c for c in carried if c.hidden])]
 
 
 def _hull(points: np.ndarray, density: float) -> tuple[Solid, MassProperties]:

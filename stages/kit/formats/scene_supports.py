@@ -34,6 +34,8 @@ class Carried:
 
     box: Box
     height: float
+    hidden: bool = False
+    """Whether nobody saw the plane."""
 
     def polygon(self, margin: float = 0.0) -> Polygon:
         """Return the footprint, grown by `margin` [m] on all sides."""
@@ -80,7 +82,8 @@ def carried_by(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) 
             continue
         height, box = resting_height(graph, nodes, link.target), nodes[link.target].box
         if height is not None and box is not None:
-            carried.append(Carried(box, height))
+            is_hidden = link.plane is not None and nodes[name].planes[link.plane].hidden
+            carried.append(Carried(box, height, is_hidden))
     return carried
 
 
