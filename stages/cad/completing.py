@@ -24,13 +24,17 @@ NO_ROOM = "it would not stand, and nothing that would make it stand has room"
 
 
 def completed(
-    graph: ContactGraphFile, meshes: Path, pieces: Mapping[str, Sequence[Piece]], free_space: FreeSpace
+    graph: ContactGraphFile,
+    meshes: Path,
+    pieces: Mapping[str, Sequence[Piece]],
+    levels: Mapping[str, float],
+    free_space: FreeSpace,
 ) -> dict[str, Inferred]:
     """Return node -> what is added to it, for what keeps its mesh (`meshes`/<node>.ply, where it stands) and would not
     stand as it was seen. What cannot be helped has no pieces.
 
-    `graph`: cg'; `pieces`: node -> convex pieces of what stands in the scene, world frame. What was added to one
-    thing is in the way of the next.
+    `graph`: cg'; `pieces`: node -> convex pieces of what stands in the scene, world frame; `levels`: floor node ->
+    height [m] that its slab has in physics. What was added to one thing is in the way of the next.
     """
     nodes = {node.id: node for node in graph.nodes}
     carriable = {entry.name for entry in load_vocabulary().classes if entry.movable}
@@ -47,7 +51,7 @@ def completed(
             continue
         link = graph.parent_link(node.id)
         carrier = "" if link is None else link.source
-        others = _others(solids, nodes, {node.id, carrier})
+        others, height = _others(solids, nodes, {node.id, carrier}), levels.get(carrier, height)
         points = np.asarray(mesh.vertices, dtype=float)
         seen = [vertices for vertices, _ in pieces[node.id]]
         added = completion_of(points, np.asarray(mesh.faces), seen, height, box_yaw(node.box), free_space, others)

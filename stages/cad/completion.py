@@ -121,11 +121,11 @@ def completion_of(
 
 
 def inside_points(corners: np.ndarray, spacing: float = SPACING) -> np.ndarray:
-    """Return points (N, 3) all over a convex piece, corners (M, 3) [m], at most `spacing` apart along each axis and
-    half as far from its bounds."""
+    """Return points (N, 3) all over a convex piece, corners (M, 3) [m], its bounds too, at most `spacing` apart along
+    each axis."""
     low, high = corners.min(axis=0), corners.max(axis=0)
-    counts = np.maximum(1, np.ceil((high - low) / spacing)).astype(int)
-    axes = [low[a] + (np.arange(counts[a]) + 0.5) * (high[a] - low[a]) / counts[a] for a in range(3)]
+    counts = np.maximum(1, np.ceil((high - low) / spacing - 1e-9)).astype(int) + 1
+    axes = [np.linspace(low[a], high[a], counts[a]) for a in range(3)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return grid[near_any(grid, [convex_of(corners)], 1e-9)]
 

@@ -97,9 +97,8 @@ def choose_and_write(
             copy_meshes(graph, chosen, panoptic_map, context)
             obstacles = obstacles_of(graph, layout, context.output / "meshes")
             solids = {name: convex_solid(pieces) for name, pieces in obstacles.items()}
-        arranged, conflicts_after = adjust(
-            graph, chosen, shortlists, surfaces, solids, floor_levels(graph, layout), method
-        )
+        levels = floor_levels(graph, layout)
+        arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         move_meshes(arranged, context.output / "meshes")
     built = [name for name, placement in arranged.placements.items() if is_built_in(placement.shape.model)]
     nameless: EntityMesh | None = None
@@ -111,7 +110,7 @@ def choose_and_write(
     standing |= {name: placed_pieces(p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items()}
     with context.progress.step("complete what would not stand"):
         free_space = method.free_space(panoptic_map)
-        inferred = completed(final, context.output / "meshes", standing, free_space)
+        inferred = completed(final, context.output / "meshes", standing, levels, free_space)
     if method.keeps_surroundings:
         with context.progress.step("surroundings"):
             pieces = [piece for some in standing.values() for piece in some]

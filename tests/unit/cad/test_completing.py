@@ -9,6 +9,9 @@ import pytest
 import trimesh
 from scenewright.schemas.cad_scene import CadScene
 from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.cad.completing import completed
+from scenewright.stages.cad.free_space import NOTHING_KNOWN
+from scenewright.stages.cad.obstacles import obstacles_of
 from scenewright.stages.kit.formats.scene_links import INFERRED
 from scenewright.stages.kit.formats.urdf_file import parse_urdf
 from scenewright.stages.urdf.parameters import UrdfParameters
@@ -51,6 +54,15 @@ def test_a_top_that_floats_stands_on_inferred_legs(replace_objects, tmp_path: Pa
     assert {shape.mesh for shape in drawn} == names <= {shape.mesh for shape in link.collisions}
     seen = [shape for shape in link.visuals if shape not in drawn]
     assert [shape.mesh for shape in seen] == ["meshes/object_2/visual.obj"]
+
+
+def test_legs_end_where_the_floor_has_its_slab_in_physics(replace_objects) -> None:
+    """A floor that slopes in the map is level in physics, here 2 cm lower than below the board."""
+    scene = top_in_the_air(replace_objects)
+    pieces = obstacles_of(scene.graph, scene.path("layout"), scene.path("meshes"))
+    found = completed(scene.graph, scene.path("meshes"), pieces, {"floor_1": -0.02}, NOTHING_KNOWN)
+    low = [np.min(corners, axis=0)[2] for corners in found["object_2"].pieces]
+    assert low == pytest.approx([-0.02] * 4, abs=1e-4)
 
 
 def test_what_has_no_room_to_stand_is_held_and_says_so(replace_objects, tmp_path: Path) -> None:
