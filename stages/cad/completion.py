@@ -111,7 +111,8 @@ def completion_of(
     seen = [piece @ room.turn for piece in pieces]
     if stands_steadily(seen, rests_at):
         return Completion()
-    for depth, grown in _deepened(own, faces, seen, room):
+    ends_low = bool(own[:, 2].min() <= rests_at + NEAR_GROUND)
+    for depth, grown in _deepened(own, faces, seen, room, to_wall=ends_low):
         for added, what in _feet(np.concatenate([own, *grown]), rests_at, room):
             if stands_steadily([*seen, *grown, *added], rests_at):
                 words = [f"{1000 * depth:.0f} mm of depth behind what was seen"] if grown else []
@@ -185,16 +186,17 @@ def _legs(points: np.ndarray, rests_at: float, room: Room) -> list[np.ndarray]:
 
 
 def _deepened(
-    points: np.ndarray, faces: np.ndarray, seen: Sequence[np.ndarray], room: Room
+    points: np.ndarray, faces: np.ndarray, seen: Sequence[np.ndarray], room: Room, *, to_wall: bool
 ) -> Iterator[tuple[float, list[np.ndarray]]]:
     """Yield depths [m] that a thing may have behind what was seen of it, and its pieces swept over them: none; up to
-    what stands behind it; then ever more from a little on. What was seen from all sides has none."""
+    what stands behind it (`to_wall`); then ever more from a little on. What was seen from all sides has none."""
     yield 0.0, []
     behind = _unseen_side(points, faces)
     if behind is None:
         return
     steps = np.arange(DEEPER, DEEPEST + 1e-9, DEEPER)
-    for depth in (*_to_what_stands_behind(points, behind, room), *steps):
+    first = _to_what_stands_behind(points, behind, room) if to_wall else []
+    for depth in (*first, *steps):
         swept = [np.concatenate([piece, piece + depth * behind]) for piece in seen]
         if room.has_room(swept):
             yield float(depth), swept

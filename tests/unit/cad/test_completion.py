@@ -126,6 +126,17 @@ def test_a_front_before_a_wall_reaches_the_wall() -> None:
     assert 0.58 <= np.concatenate(pieces)[:, 1].max() <= 0.60
 
 
+def test_the_back_of_a_chair_does_not_become_a_block_up_to_the_wall() -> None:
+    """Seen from the front, 0.5 to 0.8 m high, a wall 0.4 m behind: some depth and legs, no more than it needs."""
+    corners = np.array([[x, y, z] for x in (-2, 2) for y in (0.40, 0.50) for z in (0, 2.5)], dtype=float)
+    back = surface(((-0.25, 0.25), (0.01, 0.01), (0.5, 0.8), -1))
+    found, pieces = completed(back, others=(convex_of(turned(corners)),))
+    assert found is not None and " of depth behind what was seen and 4 legs of up to 500 mm" in found.what
+    assert np.concatenate(pieces)[:, 1].max() <= 0.20
+    below = [piece for piece in pieces if piece[:, 2].min() < 0.4]
+    assert len(below) == 4 and all(np.ptp(leg[:, :2], axis=0).max() <= LEG + 1e-9 for leg in below)
+
+
 def test_legs_keep_out_of_what_was_seen_empty() -> None:
     """Cameras saw through all that lies under the right half: the legs stand under the left, as the top still would."""
     free = seen_through((0.15, -1.0, -0.1), (1.0, 1.0, 0.64))
