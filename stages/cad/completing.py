@@ -10,7 +10,7 @@ from scenewright.schemas.base import as_vector
 from scenewright.schemas.cad_scene import Inferred
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.vocabulary import load_vocabulary
-from scenewright.stages.cad.completion import Completion, completion_of
+from scenewright.stages.cad.completion import STILL, Completion, completion_of
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.surroundings import Convex, Piece, convex_of
 from scenewright.stages.kit.formats.mesh_files import read_mesh
@@ -28,13 +28,15 @@ def completed(
     meshes: Path,
     pieces: Mapping[str, Sequence[Piece]],
     levels: Mapping[str, float],
+    shifts: Mapping[str, np.ndarray],
     free_space: FreeSpace,
 ) -> dict[str, Inferred]:
     """Return node -> what is added to it, for what keeps its mesh (`meshes`/<node>.ply, where it stands) and would not
     stand as it was seen. What cannot be helped has no pieces.
 
     `graph`: cg'; `pieces`: node -> convex pieces of what stands in the scene, world frame; `levels`: floor node ->
-    height [m] that its slab has in physics. What was added to one thing is in the way of the next.
+    height [m] that its slab has in physics; `shifts`: node -> how far (3,) it went from where it was seen [m]. What was
+    added to one thing is in the way of the next.
     """
     nodes = {node.id: node for node in graph.nodes}
     carriable = {entry.name for entry in load_vocabulary().classes if entry.movable}
@@ -54,7 +56,8 @@ def completed(
         others, height = _others(solids, nodes, {node.id, carrier}), levels.get(carrier, height)
         points = np.asarray(mesh.vertices, dtype=float)
         seen = [vertices for vertices, _ in pieces[node.id]]
-        added = completion_of(points, np.asarray(mesh.faces), seen, height, box_yaw(node.box), free_space, others)
+        yaw, went = box_yaw(node.box), shifts.get(node.id, STILL)
+        added = completion_of(points, np.asarray(mesh.faces), seen, height, yaw, free_space, others, went)
         if added is None:
             found[node.id] = Inferred(what="", because=NO_ROOM)
         elif added.pieces:

@@ -36,6 +36,7 @@ ONE_SIDED = 0.5
 """Least share of the surface by which one upright side is seen more than the one across from it."""
 CLEARANCE = 0.005
 """Room that is left to what stands behind [m]."""
+STILL = np.zeros(3)
 CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 TOLERANCE = 0.002
 """What lies no deeper in something else touches it [m]."""
@@ -50,6 +51,8 @@ class Room:
     """What else stands there, but for what carries the thing."""
     turn: np.ndarray
     """(3, 3): world from the frame of the thing."""
+    went: np.ndarray
+    """(3,) how far the thing went from where it was seen [m]: what was empty around it there goes along."""
     known: dict[tuple[tuple[float, float], float, float], bool] = field(default_factory=dict)
     """Legs that were asked for."""
 
@@ -57,13 +60,17 @@ class Room:
         """Return (N,) bool: points (N, 3), frame of the thing, in something else."""
         return near_any(points @ self.turn.T, self.others, -TOLERANCE)
 
+    def is_empty(self, points: np.ndarray) -> np.ndarray:
+        """Return (N,) bool: points (N, 3), frame of the thing, that were seen empty."""
+        return self.free_space.is_empty(points @ self.turn.T - self.went)
+
     def has_room(self, pieces: Sequence[np.ndarray]) -> bool:
         """Whether convex pieces, corners (N, 3), frame of the thing, lie neither in what was seen empty nor in
         something else."""
-        for piece in pieces:
-            points = inside_points(piece)
-            if self.takes(points[::FEW]).any() or self.takes(points).any():
-                return False
+        for points in map(inside_points, pieces):
+            for some in (points[::FEW], points):
+                if self.is_empty(some).any() or self.fills(some).any():
+                    return False
         return True
 
     def has_leg(self, place: tuple[float, float], low: float, high: float) -> bool:
@@ -72,10 +79,6 @@ class Room:
         if leg not in self.known:
             self.known[leg] = self.has_room([_between(np.array(place) + 0.5 * LEG * CORNERS, low, high)])
         return self.known[leg]
-
-    def takes(self, points: np.ndarray) -> np.ndarray:
-        """Return (N,) bool: points (N, 3), frame of the thing, that were seen empty or lie in something else."""
-        return self.free_space.is_empty(points @ self.turn.T) | self.fills(points)
 
 
 @dataclass(frozen=True)
@@ -96,17 +99,18 @@ def completion_of(
     yaw: float,
     free_space: FreeSpace,
     others: Sequence[Convex],
+    went: np.ndarray = STILL,
 ) -> Completion | None:
     """Return what makes a thing stand on a floor at height `rests_at` [m], None where nothing does that has room.
 
     `points` (V, 3) [m] and `faces` (F, 3), counter-clockwise as seen from outside, are what was seen of it, world
     frame, z up; `pieces` the corners (N, 3) of its shape in physics; `yaw` [rad] is that of its box. `others`: what
-    else stands there, but for what carries it.
+    else stands there, but for what carries it; `went` (3,): how far it stands from where it was seen [m].
     """
     low, high = points.min(axis=0) - DEEPEST, points.max(axis=0) + DEEPEST
     low[2] = min(low[2], rests_at)
     near = tuple(piece for piece in others if (piece.low < high).all() and (piece.high > low).all())
-    room = Room(free_space, near, transform_from_yaw(yaw, np.zeros(3))[:3, :3])
+    room = Room(free_space, near, transform_from_yaw(yaw, np.zeros(3))[:3, :3], went)
     own = points @ room.turn
     seen = [piece @ room.turn for piece in pieces]
     if stands_steadily(seen, rests_at):
@@ -136,9 +140,9 @@ def _feet(points: np.ndarray, rests_at: float, room: Room) -> Iterator[tuple[lis
     yield [], ""
     low = points[points[:, 2] <= rests_at + NEAR_GROUND, :2]
     if len(low) and np.ptp(low, axis=0).min() >= LEG and _enclosed(low) >= CLOSED:
-        bottom = [_between(low, rests_at, rests_at + FOOT_THICKNESS)]
-        if room.has_room(bottom):
-            yield bottom, "a bottom"
+        bottom = _between(low, rests_at, rests_at + FOOT_THICKNESS)
+        if not room.is_empty(inside_points(bottom)).any():  # what else is there its sides stand in already
+            yield [bottom], "a bottom"
     underside = points[:, 2].min() + 0.5 * np.ptp(points[:, 2])
     for upper in (points[points[:, 2] <= underside], points):  # a chair stands on legs below its seat, not its back
         legs = _legs(upper, rests_at, room)

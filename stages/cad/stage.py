@@ -110,7 +110,7 @@ def choose_and_write(
     standing |= {name: placed_pieces(p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items()}
     with context.progress.step("complete what would not stand"):
         free_space = method.free_space(panoptic_map)
-        inferred = completed(final, context.output / "meshes", standing, levels, free_space)
+        inferred = completed(final, context.output / "meshes", standing, levels, arranged.shifts, free_space)
     if method.keeps_surroundings:
         with context.progress.step("surroundings"):
             pieces = [piece for some in standing.values() for piece in some]

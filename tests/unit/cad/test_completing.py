@@ -60,7 +60,7 @@ def test_legs_end_where_the_floor_has_its_slab_in_physics(replace_objects) -> No
     """A floor that slopes in the map is level in physics, here 2 cm lower than below the board."""
     scene = top_in_the_air(replace_objects)
     pieces = obstacles_of(scene.graph, scene.path("layout"), scene.path("meshes"))
-    found = completed(scene.graph, scene.path("meshes"), pieces, {"floor_1": -0.02}, NOTHING_KNOWN)
+    found = completed(scene.graph, scene.path("meshes"), pieces, {"floor_1": -0.02}, {}, NOTHING_KNOWN)
     low = [np.min(corners, axis=0)[2] for corners in found["object_2"].pieces]
     assert low == pytest.approx([-0.02] * 4, abs=1e-4)
 
