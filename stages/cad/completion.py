@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.surroundings import Convex, convex_of, near_any
+from scenewright.stages.kit.formats.scene_supports import LARGEST_STEP
 from scenewright.stages.kit.geometry.steadiness import FOOT_THICKNESS, stands_steadily
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scipy.spatial import cKDTree
@@ -51,8 +52,10 @@ class Room:
     """What else stands there, but for what carries the thing."""
     turn: np.ndarray
     """(3, 3): world from the frame of the thing."""
+    seen: np.ndarray
+    """(V, 3) what was seen of the thing, where it was seen, world frame [m]."""
     went: np.ndarray
-    """(3,) how far the thing went from where it was seen [m]: what was empty around it there goes along."""
+    """(3,) how far the thing went from there [m]: what was empty around it goes along."""
     known: dict[tuple[tuple[float, float], float, float], bool] = field(default_factory=dict)
     """Legs that were asked for."""
 
@@ -60,9 +63,10 @@ class Room:
         """Return (N,) bool: points (N, 3), frame of the thing, in something else."""
         return near_any(points @ self.turn.T, self.others, -TOLERANCE)
 
-    def is_empty(self, points: np.ndarray) -> np.ndarray:
-        """Return (N,) bool: points (N, 3), frame of the thing, that were seen empty."""
-        return self.free_space.is_empty(points @ self.turn.T - self.went)
+    def is_empty(self, points: np.ndarray, lift: float = 0.0) -> np.ndarray:
+        """Return (N,) bool: points (N, 3), frame of the thing, that were seen empty, where they are or `lift` [m]
+        above."""
+        return self.free_space.is_empty(points @ self.turn.T - self.went + [0.0, 0.0, lift], self.seen)
 
     def has_room(self, pieces: Sequence[np.ndarray]) -> bool:
         """Whether convex pieces, corners (N, 3), frame of the thing, lie neither in what was seen empty nor in
@@ -110,7 +114,7 @@ def completion_of(
     low, high = points.min(axis=0) - DEEPEST, points.max(axis=0) + DEEPEST
     low[2] = min(low[2], rests_at)
     near = tuple(piece for piece in others if (piece.low < high).all() and (piece.high > low).all())
-    room = Room(free_space, near, transform_from_yaw(yaw, np.zeros(3))[:3, :3], went)
+    room = Room(free_space, near, transform_from_yaw(yaw, np.zeros(3))[:3, :3], points - went, went)
     own = points @ room.turn
     seen = [piece @ room.turn for piece in pieces]
     if stands_steadily(seen, rests_at):
@@ -141,7 +145,9 @@ def _feet(points: np.ndarray, rests_at: float, room: Room) -> Iterator[tuple[lis
     low = points[points[:, 2] <= rests_at + NEAR_GROUND, :2]
     if len(low) and np.ptp(low, axis=0).min() >= LEG and _enclosed(low) >= CLOSED:
         bottom = _between(low, rests_at, rests_at + FOOT_THICKNESS)
-        if not room.is_empty(inside_points(bottom)).any():  # what else is there its sides stand in already
+        gap = float(points[:, 2].min()) - rests_at
+        lift = gap if 0.0 < gap <= LARGEST_STEP else 0.0  # as far off as heights are, it is asked at its own foot
+        if not room.is_empty(inside_points(bottom), lift).any():  # what else is there its sides stand in already
             yield [bottom], "a bottom"
     underside = points[:, 2].min() + 0.5 * np.ptp(points[:, 2])
     for upper in (points[points[:, 2] <= underside], points):  # a chair stands on legs below its seat, not its back
