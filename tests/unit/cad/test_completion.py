@@ -163,8 +163,8 @@ def test_legs_keep_out_of_what_stands_there() -> None:
 
 
 def test_a_bottom_is_asked_of_what_was_seen_alone() -> None:
-    """What stands in the sides of the box stands in it already. Seen empty inside, it gets feet below its corners, which
-    are nearer to its sides than cells are exact; what was seen empty goes along with what moved."""
+    """What stands in the sides of the box stands in it already. Seen empty inside, it gets feet below its corners: by
+    its own sides cells say nothing. What was seen empty goes along with what moved."""
     inside = np.array([[x, y, z] for x in (-0.1, 0.0) for y in (-0.1, 0.1) for z in (0, 0.2)], dtype=float)
     found, _ = completed(SHELL, others=(convex_of(turned(inside)),))
     assert found is not None and found.what == "a bottom"
