@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from tests.unit.urdf.small_room import context
 CLASSES = {1: "floor", 2: "object", 3: "cup"}
 
 
-def top_in_the_air(replace_objects) -> CadScene:
+def top_in_the_air(replace_objects: Callable[..., CadScene]) -> CadScene:
     """A board at 0.7 m, 3 cm thick, over a floor, and a cup on it; neither has a model."""
     top = trimesh.creation.box((0.8, 0.5, 0.03)).subdivide_to_size(0.04).apply_translation([0, 0, 0.715])
     meshes = {1: floor_mesh((-2, -2), (2, 2)), 2: top, 3: box_mesh((-0.04, -0.04, 0.73), (0.04, 0.04, 0.83))}
@@ -34,7 +35,7 @@ def in_physics(scene: CadScene, folder: Path) -> InteractiveScene:
     return run(scene, parameters=UrdfParameters(), context=context(folder))
 
 
-def test_a_top_that_floats_stands_on_inferred_legs(replace_objects, tmp_path: Path) -> None:
+def test_a_top_that_floats_stands_on_inferred_legs(replace_objects: Callable[..., CadScene], tmp_path: Path) -> None:
     scene = top_in_the_air(replace_objects)
     [entry] = [entry for entry in scene.info.replacements if entry.node == "object_2"]
     assert entry.decision == "mesh" and entry.inferred is not None
@@ -56,7 +57,7 @@ def test_a_top_that_floats_stands_on_inferred_legs(replace_objects, tmp_path: Pa
     assert [shape.mesh for shape in seen] == ["meshes/object_2/visual.obj"]
 
 
-def test_legs_end_where_the_floor_has_its_slab_in_physics(replace_objects) -> None:
+def test_legs_end_where_the_floor_has_its_slab_in_physics(replace_objects: Callable[..., CadScene]) -> None:
     """A floor that slopes in the map is level in physics, here 2 cm lower than below the board."""
     scene = top_in_the_air(replace_objects)
     pieces = obstacles_of(scene.graph, scene.path("layout"), scene.path("meshes"))
@@ -65,7 +66,9 @@ def test_legs_end_where_the_floor_has_its_slab_in_physics(replace_objects) -> No
     assert low == pytest.approx([-0.02] * 4, abs=1e-4)
 
 
-def test_what_has_no_room_to_stand_is_held_and_says_so(replace_objects, tmp_path: Path) -> None:
+def test_what_has_no_room_to_stand_is_held_and_says_so(
+    replace_objects: Callable[..., CadScene], tmp_path: Path
+) -> None:
     """The same scene without what was added: the board is held, the cup on it free."""
     scene = top_in_the_air(replace_objects)
     file = scene.info

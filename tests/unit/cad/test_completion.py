@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from scenewright.stages.cad.completion import LEG, completion_of, inside_points
+from scenewright.stages.cad.completion import LEG, Completion, completion_of, inside_points
 from scenewright.stages.cad.free_space import NOTHING_KNOWN, NOWHERE, FreeSpace, blocks_of
 from scenewright.stages.cad.surroundings import Convex, convex_of
 from scenewright.stages.kit.formats.scene_supports import furniture_pieces
@@ -36,7 +36,13 @@ def surface(*rectangles: tuple[tuple[float, float], tuple[float, float], tuple[f
         faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
         looks_up = side * (1 if axis != 1 else -1) > 0
         meshes.append(trimesh.Trimesh(grid.reshape(-1, 3), faces if looks_up else faces[:, ::-1], process=False))
-    return trimesh.util.concatenate(meshes)
+    return trimesh.Trimesh(*_joined(meshes), process=False)
+
+
+def _joined(meshes: list[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [np.asarray(mesh.faces) + start for mesh, start in zip(meshes, starts, strict=False)]
+    return np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)
 
 
 TABLETOP = surface(((-0.6, 0.6), (-0.4, 0.4), (0.72, 0.72), 1), ((-0.6, 0.6), (-0.4, -0.4), (0.70, 0.72), -1))
@@ -49,7 +55,9 @@ SHELL = surface(
 )
 
 
-def completed(mesh: trimesh.Trimesh, free: FreeSpace = NOTHING_KNOWN, others: tuple[Convex, ...] = ()):
+def completed(
+    mesh: trimesh.Trimesh, free: FreeSpace = NOTHING_KNOWN, others: tuple[Convex, ...] = ()
+) -> tuple[Completion | None, list[np.ndarray]]:
     """What a mesh that stands at 0 m is completed by, in its own frame."""
     points, faces = turned(np.asarray(mesh.vertices)), np.asarray(mesh.faces)
     found = completion_of(points, faces, furniture_pieces(points, faces, 0.0), 0.0, TURN, free, others)
