@@ -2,7 +2,8 @@
 
 Things stand. Where the seen part of one would not, the least is added with which it does: a bottom where its sides end
 near the ground, else legs below its corners, else first some depth on the side that no camera saw. Nothing is added
-where cameras saw that nothing is, or where something else stands; so a table gets legs, and never a skirt.
+where cameras saw that nothing is, or where something else stands; so a table gets legs, and never a skirt. A bottom
+within 4 cm of what was seen is no addition to ask for: heights are exact to no more.
 """
 
 from __future__ import annotations
@@ -63,10 +64,9 @@ class Room:
         """Return (N,) bool: points (N, 3), frame of the thing, in something else."""
         return near_any(points @ self.turn.T, self.others, -TOLERANCE)
 
-    def is_empty(self, points: np.ndarray, lift: float = 0.0) -> np.ndarray:
-        """Return (N,) bool: points (N, 3), frame of the thing, that were seen empty, where they are or `lift` [m]
-        above."""
-        return self.free_space.is_empty(points @ self.turn.T - self.went + [0.0, 0.0, lift], self.seen)
+    def is_empty(self, points: np.ndarray) -> np.ndarray:
+        """Return (N,) bool: points (N, 3), frame of the thing, that were seen empty."""
+        return self.free_space.is_empty(points @ self.turn.T - self.went, self.seen)
 
     def has_room(self, pieces: Sequence[np.ndarray]) -> bool:
         """Whether convex pieces, corners (N, 3), frame of the thing, lie neither in what was seen empty nor in
@@ -145,9 +145,8 @@ def _feet(points: np.ndarray, rests_at: float, room: Room) -> Iterator[tuple[lis
     low = points[points[:, 2] <= rests_at + NEAR_GROUND, :2]
     if len(low) and np.ptp(low, axis=0).min() >= LEG and _enclosed(low) >= CLOSED:
         bottom = _between(low, rests_at, rests_at + FOOT_THICKNESS)
-        gap = float(points[:, 2].min()) - rests_at
-        lift = gap if 0.0 < gap <= LARGEST_STEP else 0.0  # as far off as heights are, it is asked at its own foot
-        if not room.is_empty(inside_points(bottom), lift).any():  # what else is there its sides stand in already
+        is_near = points[:, 2].min() - rests_at <= LARGEST_STEP  # heights are exact to no more
+        if is_near or not room.is_empty(inside_points(bottom)).any():  # what else is there its sides stand in already
             yield [bottom], "a bottom"
     underside = points[:, 2].min() + 0.5 * np.ptp(points[:, 2])
     for upper in (points[points[:, 2] <= underside], points):  # a chair stands on legs below its seat, not its back

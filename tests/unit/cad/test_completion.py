@@ -48,10 +48,10 @@ def _joined(meshes: list[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
 TABLETOP = surface(((-0.6, 0.6), (-0.4, 0.4), (0.72, 0.72), 1), ((-0.6, 0.6), (-0.4, -0.4), (0.70, 0.72), -1))
 FRONT = surface(((-0.3, 0.3), (0.0, 0.0), (0.0, 1.0), -1))
 SHELL = surface(
-    ((-0.2, 0.2), (-0.15, -0.15), (0.04, 0.3), -1),
-    ((-0.2, 0.2), (0.15, 0.15), (0.04, 0.3), 1),
-    ((-0.2, -0.2), (-0.15, 0.15), (0.04, 0.3), -1),
-    ((0.2, 0.2), (-0.15, 0.15), (0.04, 0.3), 1),
+    ((-0.2, 0.2), (-0.15, -0.15), (0.06, 0.3), -1),
+    ((-0.2, 0.2), (0.15, 0.15), (0.06, 0.3), 1),
+    ((-0.2, -0.2), (-0.15, 0.15), (0.06, 0.3), -1),
+    ((0.2, 0.2), (-0.15, 0.15), (0.06, 0.3), 1),
 )
 
 
@@ -178,8 +178,11 @@ def test_a_bottom_is_asked_of_what_was_seen_alone() -> None:
     assert found is not None and found.what == "a bottom"
     free = seen_through((-1.0, -1.0, -0.2), (1.0, 1.0, 0.2))
     hollow, feet = completed(SHELL, free)
-    assert hollow is not None and hollow.what == "4 legs of up to 40 mm" and len(feet) == 4
+    assert hollow is not None and hollow.what == "4 legs of up to 60 mm" and len(feet) == 4
     points, faces = turned(np.asarray(SHELL.vertices)), np.asarray(SHELL.faces)
+    lower = SHELL.copy().apply_translation([0, 0, -0.03])
+    near, _ = completed(lower, free)
+    assert near is not None and near.what == "a bottom", "3 cm: heights are exact to no more"
     far = np.array([0.0, 0.0, 5.0])
     moved = completion_of(points, faces, furniture_pieces(points, faces, 0.0), 0.0, TURN, free, (), went=far)
     assert moved is not None and moved.what == "a bottom"
