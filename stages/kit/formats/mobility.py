@@ -1,8 +1,8 @@
 """What of a scene is free to move: what an arm carries, and furniture that stands by its own weight.
 
 Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
-thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane within 4 cm of its
-bottom, laden or not. What a person marked (`edit mark`) is as they said; what hangs stays.
+thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane, laden or not.
+What a person marked (`edit mark`) is as they said; what hangs stays.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from scenewright.stages.kit.formats.scene_supports import resting_height
+from scenewright.stages.kit.formats.scene_supports import support_height
 
 STANDS = ("supports", "contains")
 BUILT_IN = frozenset(
@@ -75,6 +75,6 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
         return Mobility(False, why=f"class {node.class_name} is among the classes to keep fixed")
     if node.class_name in BUILT_IN:
         return Mobility(False, why=f"class {node.class_name} is part of the building, or too heavy to push")
-    if resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
-        return Mobility(False, why="it stands on no level plane within 4 cm of its bottom")
+    if support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
+        return Mobility(False, why="the graph puts it on no level plane")
     return Mobility(True, furniture=True, why="it is furniture and stands by its own weight")
