@@ -14,6 +14,9 @@ from scenewright.schemas.scene_parts import Joint
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.mobility import STANDS, Mobility, mobility
 
+HELD, INFERRED = "held: ", "inferred: "
+"""How `because` of a body begins (schemas/interactive_scene.py)."""
+
 
 def scene_reasons(scene: InteractiveScene) -> Reasons:
     """Return the reasons of every body and of every joint that moves."""
@@ -36,10 +39,9 @@ def body_reasons(
     nodes, rows = {node.id: node for node in graph.nodes}, {}
     for body in scene.bodies:
         expected = mobility(graph, nodes[body.name], carriable, fixed) if body.name in nodes else None
-        has_model = body.name in nodes and nodes[body.name].model_id is not None
         load = [b.name for b in scene.bodies if b.parent == body.name and not b.movable and b.relation in STANDS]
         joints = [Reason(*joint_words(joint, body.joint_values.get(joint.name))) for joint in body.joints]
-        rows[body.name] = [_free_or_fixed(body, expected, load, has_model), *_laid_down(body), *joints]
+        rows[body.name] = [_free_or_fixed(body, expected, load), *_inferred(body), *_laid_down(body), *joints]
         rows |= {joint.name: [reason] for joint, reason in zip(body.joints, joints, strict=True)}
     return rows
 
@@ -65,22 +67,28 @@ def settled_reason(body: SettledBody, margin: float | None) -> Reason:
     return Reason(says, body.model_dump(mode="json", exclude={"poses"}) | {"margin": margin})
 
 
-def _free_or_fixed(body: SceneBody, expected: Mobility | None, load: list[str], has_model: bool) -> Reason:
+def _free_or_fixed(body: SceneBody, expected: Mobility | None, load: list[str]) -> Reason:
     facts = {"movable": body.movable, "furniture": body.furniture, "parent": body.parent, "mass": body.mass}
     state = "free" if body.carriable else "free as furniture, which no arm carries" if body.movable else "fixed"
     if body.name == SURROUNDINGS:
         why = "it is all that was mapped and has no name"
+    elif body.because.startswith(HELD):
+        why = body.because.removeprefix(HELD)
     elif expected is None:
         why = "the graph has no node of it"
     elif expected.movable == body.movable:
         why = expected.why
     elif body.movable:
         why = "`urdf` was given other classes"
-    elif load:
-        why = f"it carries {listed(load)}, fixed too"
     else:
-        why = f"{expected.why}, but it {'is a built-in model' if has_model else 'would tip over'}, or is wedged"
+        why = f"it carries {listed(load)}, fixed too" if load else "it was made before scenes said why"
     return Reason(f"It is {state}: {why}.", facts | {"why": why})
+
+
+def _inferred(body: SceneBody) -> Iterator[Reason]:
+    if body.because.startswith(INFERRED):
+        what, _, why = body.because.removeprefix(INFERRED).partition("; ")
+        yield Reason(f"Nobody saw {what} of it: {why}.", {"inferred": what, "because": why})
 
 
 def _laid_down(body: SceneBody) -> Iterator[Reason]:

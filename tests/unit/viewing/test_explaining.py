@@ -318,12 +318,15 @@ def test_a_body_says_why_it_is_free_or_fixed() -> None:
 
 
 def test_what_could_be_free_and_is_held_says_so() -> None:
-    """A cup under something fixed, and one whose mesh would tip over."""
+    """A cup under something fixed, one that would not stand, and one of which a part is inferred."""
     loaded = InteractiveSceneFile(bodies=(body("cup_5", movable=False), body("lamp_6", movable=False, parent="cup_5")))
     assert said(body_reasons(loaded, GRAPH, {"cup"}, ())["cup_5"]) == ["It is fixed: it carries lamp_6, fixed too."]
-    alone = InteractiveSceneFile(bodies=(body("cup_5", movable=False),))
-    assert said(body_reasons(alone, GRAPH, {"cup"}, ())["cup_5"]) == [
-        "It is fixed: an arm carries things of class cup, but it would tip over, or is wedged."
+    alone = InteractiveSceneFile(bodies=(body("cup_5", movable=False, because="held: it would not stand"),))
+    assert said(body_reasons(alone, GRAPH, {"cup"}, ())["cup_5"]) == ["It is fixed: it would not stand."]
+    completed = body("cup_5", movable=True, because="inferred: a bottom; what was seen ends 16 mm above the shelf")
+    assert said(body_reasons(InteractiveSceneFile(bodies=(completed,)), GRAPH, {"cup"}, ())["cup_5"]) == [
+        "It is free: an arm carries things of class cup.",
+        "Nobody saw a bottom of it: what was seen ends 16 mm above the shelf.",
     ]
     left = settled_reason(SettledBody(name="cup_5", moved=0.2, turned=0.5, leaves=0.75), 1.5)
     assert left.says == (
