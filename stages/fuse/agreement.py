@@ -87,19 +87,15 @@ def agreed(
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
-    parts = joined(
-        scene,
-        labels.instance,
-        frozenset(e.instance for e in kept if e.class_id in things),
-        looks.on(scene.vertices, labels.instance),
-        voxel,
-    )
+    points = looks.on(scene.vertices, labels.instance)
+    may_join = frozenset(entity.instance for entity in kept if entity.class_id in things)
+    parts = joined(scene, labels.instance, may_join, points, voxel)
     if parts:
         whole = np.array([parts.get(k, k) for k in range(int(labels.instance.max(initial=0)) + 1)], np.int32)
         kept, labels = relabelled(surface, kept, labels, whole[labels.instance], {})
+        points = [(mask, whole[thing]) for mask, thing in points]
         shapes |= dict.fromkeys(parts.values(), JOINED)
-    said = looks.said_of(scene.vertices, labels.instance)
-    named, labels, reasons = with_names(kept, labels, shapes, said, vocabulary, things)
+    named, labels, reasons = with_names(kept, labels, shapes, looks.said_of(points), vocabulary, things)
     return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
 
 

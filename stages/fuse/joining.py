@@ -20,6 +20,7 @@ HAS = 0.5
 LACKS = 0.2
 """It has not where it has less."""
 FEWEST_LOOKS = 2
+"""One look with both may be a mask that ran over."""
 RARELY = 0.1
 """Looks that part two things are rare up to this share of those that join them."""
 TOUCHING = 3.0

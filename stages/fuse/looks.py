@@ -72,11 +72,11 @@ class Looks:
         if len(self.kept) > KEPT:
             self.kept, self.every = self.kept[::2], 2 * self.every
 
-    def said_of(self, vertices: np.ndarray, instance: np.ndarray) -> dict[int, Said]:
-        """Return by instance what was said of it. vertices (V, 3) [m], instance (V,), 0 none."""
+    def said_of(self, points: Sequence[tuple[np.ndarray, np.ndarray]]) -> dict[int, Said]:
+        """Return by instance what was said of it. `points`: per look the mask and the instance of each, from `on`."""
         looks: dict[int, int] = defaultdict(int)
         scores: dict[int, dict[int, float]] = defaultdict(lambda: defaultdict(float))
-        for look, (mask, thing) in zip(self.kept, self.on(vertices, instance), strict=True):
+        for look, (mask, thing) in zip(self.kept, points, strict=True):
             seen, spoken = spoken_of(mask, thing, len(look.said))
             for k in seen:
                 looks[k] += 1
@@ -89,7 +89,10 @@ class Looks:
         }
 
     def on(self, vertices: np.ndarray, instance: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return per look the mask (N,) of every point and the instance (N,) that it lies on; arguments as above."""
+        """Return per look the mask (N,) of every point and the instance (N,) that it lies on, 0 none.
+
+        vertices (V, 3) [m], instance (V,), 0 none.
+        """
         if not self.kept:
             return []
         if not len(vertices):
