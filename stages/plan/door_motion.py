@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.acting.doors import OVERSHOOT, first_along, pushes
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.kit.motion.arcs import Arc, along_arc, arc_values, tilts
+from scenewright.stages.kit.motion.arcs import Arc, arc_values, tilts
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.base_placement import possible_bases, shoulder_distance
 from scenewright.stages.kit.motion.doors import (
@@ -24,10 +25,6 @@ from scenewright.stages.plan.action import MotionRequest
 from scenewright.stages.plan.pick_place import Budgets
 from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
 
-OVERSHOOT = 0.02
-"""A door is pushed this much beyond shut [rad]; its limit stops it."""
-PRESS = 0.006
-"""The commanded finger tips are this far inside the door's surface, so that they stay in touch [m]."""
 GRIP_SLACK = 0.012
 """Opening to which the fingers close on a handle [m]; by eye."""
 OPEN = 0.5
@@ -129,46 +126,39 @@ class JointSearch:
 def _push(search: JointSearch, start: float, end: float) -> Manipulation | None:
     model, state, body, joint, tally = search.model, search.state, search.body, search.joint, search.tally
     budgets, random = search.budgets, search.random
-    world_from_body = model.pose(body)
-    lift = float(world_from_body[2, 3])
+    lift = float(model.pose(body)[2, 3])
     part = model.part_mesh(body, joint.part)
     lowest = min(0.45 - lift, float(part.bounds[1][2]) - 0.05)
     contacts = push_points(joint, part, random, 6, (lowest, 1.25 - lift))
-    values = arc_values(start, end)
-    gap = model.description.tip_overhang - PRESS
+    values, overhang = arc_values(start, end), model.description.tip_overhang
     planner = ArmPlanner(model, random, budgets.path_samples)
     for contact in contacts:
-        route = np.array(
-            [apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values]
-        )
-        bases = _candidate_bases(search, route)
-        for tilt in tilts(len(values)):
-            for roll in (0.0, np.pi / 2):
-                arc = Arc(body, joint, contact, values, tilt, roll, gap, 0.0, 0.0)
-                for base in bases[:6]:
-                    motion = along_arc(model, state.arm, arc, base, planner, tally)
-                    if motion is not None:
-                        return motion
+        bases = _bases_along(search, contact, values)[:6]
+        arcs = pushes(body, joint, (contact,), values, tuple(tilts(len(values))), overhang)
+        motion = first_along(model, state.arm, arcs, bases, planner, tally)
+        if motion is not None:
+            return motion
     return None
 
 
 def _drag(search: JointSearch, contact: ContactPoint, roll: float, start: float, end: float) -> Manipulation | None:
-    model, state, body, joint, tally = search.model, search.state, search.body, search.joint, search.tally
-    budgets, random = search.budgets, search.random
-    world_from_body = model.pose(body)
-    values = arc_values(start, end)
-    route = np.array([apply(world_from_body @ body_from_moved(joint, float(value)), contact.point) for value in values])
-    bases = _candidate_bases(search, route)
-    opening = model.description.opening
-    planner = ArmPlanner(model, random, budgets.path_samples)
-    for tilt in tilts(len(values)):
-        for flip in (0.0, np.pi):
-            arc = Arc(body, joint, contact, values, tilt, roll + flip, 0.0, opening, GRIP_SLACK)
-            for base in bases[:10]:
-                motion = along_arc(model, state.arm, arc, base, planner, tally)
-                if motion is not None:
-                    return motion
-    return None
+    model, body, joint = search.model, search.body, search.joint
+    values, opening = arc_values(start, end), model.description.opening
+    bases = _bases_along(search, contact, values)[:10]
+    planner = ArmPlanner(model, search.random, search.budgets.path_samples)
+    arcs = (
+        Arc(body, joint, contact, values, tilt, roll + flip, 0.0, opening, GRIP_SLACK)
+        for tilt in tilts(len(values))
+        for flip in (0.0, np.pi)
+    )
+    return first_along(model, search.state.arm, arcs, bases, planner, search.tally)
+
+
+def _bases_along(search: JointSearch, contact: ContactPoint, values: np.ndarray) -> np.ndarray:
+    """Return free bases (K, 3) that reach a contact of the part at all of some joint values (N,)."""
+    world_from_body, joint = search.model.pose(search.body), search.joint
+    moved = (world_from_body @ body_from_moved(joint, float(value)) for value in values)
+    return _candidate_bases(search, np.array([apply(pose, contact.point) for pose in moved]))
 
 
 def check_joint(joint: Joint, value: float, action: str, planned: str, reached: Callable[[Joint, float], bool]) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.cartesian import drawn_back, raised
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import forward
 from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_body
@@ -77,9 +78,7 @@ def level_place(
         world_from_tool = upright @ inverse(state.tool_from_item)
         if planner.reachable(base, world_from_tool, tally, starts=2) is None:
             continue
-        above = world_from_tool.copy()
-        above[2, 3] += RAISE
-        over = in_hand.line(base, state.arm, above, tally)
+        over = in_hand.line(base, state.arm, raised(world_from_tool, RAISE), tally)
         if over is None:
             continue
         down = onto.line(base, over[-1], world_from_tool, tally)
@@ -88,9 +87,7 @@ def level_place(
         opening = model.description.opening
         model.robot.set(Configuration(base, down[-1], opening))
         with model.world.posed(item, upright):
-            back = world_from_tool.copy()
-            back[:3, 3] -= RETREAT * back[:3, 2]
-            away = leaving.line(base, down[-1], back, tally)
+            away = leaving.line(base, down[-1], drawn_back(world_from_tool, RETREAT), tally)
             if away is None:
                 continue
             try:

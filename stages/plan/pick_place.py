@@ -12,6 +12,7 @@ from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.base_placement import free_bases, possible_bases
+from scenewright.stages.kit.motion.cartesian import drawn_back, raised
 from scenewright.stages.kit.motion.collision import RESTING_DEPTH
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
@@ -131,13 +132,6 @@ def _bearable_grasps(model: WorldModel, item: str, grasps: list[Grasp]) -> list[
             {"moment": float(moments.min()), "holding_moment": most},
         )
     return [grasp for grasp, moment in zip(grasps, moments, strict=True) if moment <= most]
-
-
-def _retreat(world_from_tool: np.ndarray, distance: float) -> np.ndarray:
-    """Return the tool pose drawn back against its approach [m]."""
-    pose = world_from_tool.copy()
-    pose[:3, 3] -= distance * pose[:3, 2]
-    return pose
 
 
 def _shifted_pose(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
@@ -274,13 +268,10 @@ def _try_pick(
     opening = model.description.opening
     model.robot.set(_opened_configuration(state, opening))
     at_item = arm_planner.under(touching(model.links(item)))
-    arm = arm_planner.reachable(base, world_from_tool, tally)
-    if arm is None or not at_item.free(base, arm, tally):
-        return None
-    approach = at_item.line(base, arm, _retreat(world_from_tool, APPROACH), tally)
+    approach = at_item.straight(base, world_from_tool, drawn_back(world_from_tool, APPROACH), tally)
     if approach is None:
         return None
-    approach = approach[::-1]
+    approach, arm = approach[::-1], approach[0]
     # With the item in hand: up a little, then back out the way the hand came, or further up.
     tool_from_item = inverse(world_from_tool) @ world_from_item
     # What overlaps the item where it is believed to be is an error of belief: it may overlap as much on the way out.
@@ -344,7 +335,7 @@ def _lifted(
     item = out.checker.query.carried
     laden = item is not None and model.laden(item)
     for lift in lifts:
-        goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
+        goal = raised(world_from_tool, lift)
         up = off.line(base, arm, goal, tally)
         if up is None:
             continue
@@ -507,14 +498,12 @@ def _try_place(
         yaw = float(np.arctan2(item_pose[1, 0], item_pose[0, 0])) if steep else outward - np.arctan2(hand[1], hand[0])
         upright = transform_from_yaw(yaw + wish, item_pose[:3, 3]) @ upright_from_item
         world_from_tool = upright @ item_from_tool
-        arm = arm_planner.reachable(base, world_from_tool, tally)
-        if arm is None or not onto.free(base, arm, tally):
-            continue
         height = LIFT if placement.covered else DRAWER_LIFT if placement.in_drawer else APPROACH
-        above = _shifted_pose(world_from_tool, np.array([0, 0, height]))
-        down = onto.line(base, arm, above, tally)
+        above = raised(world_from_tool, height)
+        down = onto.straight(base, world_from_tool, above, tally)
         if down is None:
             continue
+        arm = down[0]
         if placement.covered:
             flat = above[:3, 2] * np.array([1, 1, 0])
             out = in_hand.line(base, down[-1], _shifted_pose(above, -BACK_OUT[0] * flat), tally)
@@ -532,7 +521,7 @@ def _try_place(
     opening = model.description.opening
     with model.world.posed(item, upright):
         model.robot.set(_opened_configuration(state, opening))
-        away = arm_planner.under(touching(links)).line(base, arm, _retreat(world_from_tool, APPROACH + 0.02), tally)
+        away = arm_planner.under(touching(links)).line(base, arm, drawn_back(world_from_tool, APPROACH + 0.02), tally)
         if away is None:
             return None
         try:

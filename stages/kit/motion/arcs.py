@@ -10,7 +10,7 @@ import numpy as np
 from scenewright.schemas.scene_parts import Joint
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ARM_RESOLUTION, ArmModel, ArmPlanner, Tally
-from scenewright.stages.kit.motion.cartesian import follow
+from scenewright.stages.kit.motion.cartesian import drawn_back, follow
 from scenewright.stages.kit.motion.collision import Collision
 from scenewright.stages.kit.motion.doors import ContactPoint, tool_poses
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -104,16 +104,12 @@ def along_arc(
     pulling = opening > 0
     try:
         with model.world.joints_at(body, {joint.name: float(values[0])}):
-            standoff_pose = poses[0].copy()
-            standoff_pose[:3, 3] -= STANDOFF * standoff_pose[:3, 2]
-            approach = at_handle.line(base, arms[0], standoff_pose, tally)
+            approach = at_handle.line(base, arms[0], drawn_back(poses[0], STANDOFF), tally)
             if approach is None:
                 return None
             reach = planner.path(base, arm, approach[-1])
         with model.world.joints_at(body, {joint.name: max(0.0, float(values[-1]))}):
-            far = poses[-1].copy()
-            far[:3, 3] -= STANDOFF * far[:3, 2]
-            away = at_handle.line(base, arms[-1], far, tally)
+            away = at_handle.line(base, arms[-1], drawn_back(poses[-1], STANDOFF), tally)
             if away is None:
                 return None
             home = planner.path(base, away[-1], model.description.carry)

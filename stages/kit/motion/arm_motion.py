@@ -134,6 +134,21 @@ class ArmPlanner:
             tally.collided(collision)
         return collision is None
 
+    def free_at(
+        self, base: np.ndarray, world_from_tool: np.ndarray, tally: Tally, starts: int = 6
+    ) -> np.ndarray | None:
+        """Return arm values (J,) for a tool pose (4, 4) that are free, or None (counted in the tally)."""
+        arm = self.reachable(base, world_from_tool, tally, starts)
+        return arm if arm is not None and self.free(base, arm, tally) else None
+
+    def straight(
+        self, base: np.ndarray, at: np.ndarray, before: np.ndarray, tally: Tally, starts: int = 6
+    ) -> np.ndarray | None:
+        """Return arm values (K, J) from a tool pose (4, 4) along a straight line to the one before it: backwards, the
+        hand's way in. None (counted in the tally) where the one is out of reach, or something is in the way."""
+        arm = self.free_at(base, at, tally, starts)
+        return None if arm is None else self.line(base, arm, before, tally)
+
     def line(self, base: np.ndarray, start: np.ndarray, world_from_goal: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (K, J) from `start` (J,) included along a straight line of the tool; None if not free."""
         hand_pose = base_pose(base, self.model.description) @ forward(self.model.chain, start)
@@ -168,8 +183,8 @@ class ArmPlanner:
     def folded(self, base: np.ndarray, arm: np.ndarray, tally: Tally) -> np.ndarray | None:
         """Return arm values (J,) with the tool drawn in over the pedestal; what is held stays upright."""
         for pose in self._drawn_in(base, arm):
-            solution = self.reachable(base, pose, tally)
-            if solution is not None and self.free(base, solution, tally):
+            solution = self.free_at(base, pose, tally)
+            if solution is not None:
                 return solution
         return None
 

@@ -26,6 +26,20 @@ def straight_poses(start: np.ndarray, end: np.ndarray, step: float = 0.015) -> l
     return poses
 
 
+def drawn_back(world_from_tool: np.ndarray, distance: float) -> np.ndarray:
+    """Return a tool pose (4, 4) drawn back against the way that the hand points [m]."""
+    pose = world_from_tool.copy()
+    pose[:3, 3] -= distance * pose[:3, 2]
+    return pose
+
+
+def raised(pose: np.ndarray, height: float) -> np.ndarray:
+    """Return a pose (4, 4) so much higher [m]."""
+    above = pose.copy()
+    above[2, 3] += height
+    return above
+
+
 def follow(chain: ArmChain, base_from_tool: list[np.ndarray], start: np.ndarray) -> np.ndarray:
     """Return arm values (K, J), one per tool pose (4, 4), each solved from the one before, beginning at `start` (J,).
 

@@ -19,6 +19,7 @@ from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
+from scenewright.stages.kit.motion.cartesian import drawn_back, raised
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.grasps import narrowest_width
 from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_starts
@@ -81,11 +82,10 @@ def reachable(
         pose = pointing(float(np.arctan2(at[1] - base[1], at[0] - base[0])), pitch)
         pose[:3, 3] = (at[0], at[1], at[2] + (0.05 if forward else 0.10))
         if forward:
-            pose[:3, 3] -= 0.10 * pose[:3, 2]
+            pose = drawn_back(pose, 0.10)
         if shoulder_distance(base, pose, beliefs.description, beliefs.chain) > planner.reach - 0.02:
             continue
-        arm = planner.reachable(base, pose, tally, starts=3)
-        if arm is not None and planner.free(base, arm, tally):
+        if planner.free_at(base, pose, tally, starts=3) is not None:
             return True
     return False
 
@@ -226,13 +226,10 @@ def _way_in(
         at = _by_another_elbow(planner, base, map_from_tool, tally) if target.behind > 0 else None
     if at is None:
         return None
-    before = map_from_tool.copy()
-    before[:3, 3] -= (APPROACH + target.behind) * before[:3, 2]
-    approach = planner.line(base, at, before, tally)
+    approach = planner.line(base, at, drawn_back(map_from_tool, APPROACH + target.behind), tally)
     if approach is None:
         return None
-    above = map_from_tool.copy()
-    above[2, 3] += LIFT_INSIDE if target.behind > 0 else LIFT
+    above = raised(map_from_tool, LIFT_INSIDE if target.behind > 0 else LIFT)
     lift = planner.line(base, at, above, tally)
     if lift is None or target.behind == 0:
         return None if lift is None else (approach, lift)

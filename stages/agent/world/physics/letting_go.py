@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.stages.agent.world.physics.beliefs import HELD, Beliefs, Believed, Hold
 from scenewright.stages.agent.world.physics.hands import SAMPLES, SLOW, Motion, pointing
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
+from scenewright.stages.kit.motion.cartesian import raised
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
@@ -69,12 +70,7 @@ def plan_release(
         for turn, tilt in TURNS:
             pose = _tilt(_tool_rotation(hold, heading, turn), heading, tilt)
             pose[:3, 3] = (at[0], at[1], at[2] + height + foot)
-            goal = planner.reachable(base, pose, tally, starts=3)
-            if goal is None or not planner.free(base, goal, tally):
-                continue
-            above = pose.copy()
-            above[2, 3] += up
-            down = planner.line(base, goal, above, tally)
+            down = planner.straight(base, pose, raised(pose, up), tally, starts=3)
             if down is None:
                 continue
             beliefs.show(spot.around)

@@ -23,7 +23,7 @@ from scenewright.stages.kit.rendering.object_views import Picture, take
 
 SIDEWAYS = (0.0, -0.5, 0.5)
 """Turns of the first joint for the three wrist poses [rad]."""
-STEEP, OVER = (1.5, 1.3, 1.1), 0.45
+STEEP, OVER = (1.5, 1.3, 1.1), (0.45,)
 """How far down the wrist camera looks at a thing from above, the steepest first [rad], and from how far [m]."""
 FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), (0.0, 0.25, -0.25)
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
@@ -89,8 +89,8 @@ class Looking:
         shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
         if shelf is not None and not shelf.slides:
             arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)
-        elif close:
-            arms += self._arms_over(at)
+        elif close and self._robot.hold is None:
+            arms += self._arms_at(at, STEEP, OVER, INTO_ASIDE[:1])
         if not arms:
             return Look((), sector, close, in_view=False)
         nearest_surface = self._seen.nearest(at) if close and shelf is not None else None
@@ -175,28 +175,11 @@ class Looking:
             for away, pitch in product(aways, pitches):
                 ahead = np.array([cos(heading) * cos(pitch), sin(heading) * cos(pitch), -sin(pitch)])
                 tool = look_at(np.array(at) - away * ahead, target) @ inverse(TOOL_FROM_CAMERA)
-                arm = planner.reachable(base, tool, tally, starts=3)
-                if arm is not None and planner.free(base, arm, tally):
+                arm = planner.free_at(base, tool, tally, starts=3)
+                if arm is not None:
                     arms.append(arm)
                     break
         return arms
-
-    def _arms_over(self, at: Position) -> list[np.ndarray]:
-        """Return the arm that holds the wrist camera as steeply over a position as it gets; none where it does not."""
-        if self._robot.hold is not None:
-            return []
-        self._robot.beliefs.hold(None)
-        self._robot.beliefs.show(self._seen.boxes())
-        base, tally = self._robot.believed, Tally()
-        planner = ArmPlanner(self._robot.beliefs, np.random.default_rng(5), 0)
-        heading = atan2(at[1] - base[1], at[0] - base[0])
-        for pitch in STEEP:
-            ahead = np.array([cos(heading) * cos(pitch), sin(heading) * cos(pitch), -sin(pitch)])
-            tool = look_at(np.array(at) - OVER * ahead, np.array(at)) @ inverse(TOOL_FROM_CAMERA)
-            arm = planner.reachable(base, tool, tally, starts=3)
-            if arm is not None and planner.free(base, arm, tally):
-                return [arm]
-        return []
 
     def _aim(self, pose: np.ndarray, at: Position, close: bool) -> np.ndarray:
         """Return a camera pose, with the crop of a near look turned to the position that it is of."""

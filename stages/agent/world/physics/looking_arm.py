@@ -33,8 +33,8 @@ def looking_arm(beliefs: Beliefs) -> np.ndarray:
         return robot.look
     planner, tally = ArmPlanner(beliefs, np.random.default_rng(11), 0), Tally()
     for height, ahead in product(HEIGHTS, AHEAD):
-        arm = planner.reachable(np.zeros(3), _pointing_down(ahead, height), tally, starts=STARTS)
-        if arm is not None and planner.free(np.zeros(3), arm, tally):
+        arm = planner.free_at(np.zeros(3), _pointing_down(ahead, height), tally, starts=STARTS)
+        if arm is not None:
             return arm
     raise BadInput(
         f"robot {robot.name}: found no free arm with the hand {np.degrees(DOWN):.0f} degrees down, "

@@ -23,8 +23,9 @@ from scenewright.stages.agent.world.physics.fronts import PARTS, Front
 from scenewright.stages.agent.world.physics.looking import Looking
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom, felt
 from scenewright.stages.agent.world.physics.seen import Seen
+from scenewright.stages.kit.acting.doors import OVERSHOOT, first_along, pushes
 from scenewright.stages.kit.geometry.transforms import apply, inverse
-from scenewright.stages.kit.motion.arcs import Arc, along_arc, arc_values
+from scenewright.stages.kit.motion.arcs import Arc, arc_values
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.doors import (
     ContactPoint,
@@ -56,8 +57,6 @@ DEEPER = 0.008
 """Distance of the tool point behind the middle of a bar [m]: held by their ends alone, the fingers slide off it."""
 NOTHING_GRIPPED = 0.01
 """Opening of the fingers below which they hold no bar [m]."""
-PRESS, OVERSHOOT = 0.006, 0.02
-"""The commanded finger tips are so far inside what is pushed [m], and go so much beyond shut [rad] or [m]."""
 PUSHES = 4
 """Most pushes at one front: something may be in the way of one. By eye."""
 NOTICED = 0.1
@@ -237,19 +236,17 @@ class Pulling:
         handle = np.array(joint.handle)
         bar = np.array(joint.handle_axis)
         inward = closing_direction(joint, handle)
-        shares = (FAR_OUT, *SHARES) if front.slides else SHARES
-        for share in shares if front.alone else shares[:-1]:  # of several, one that is half open hides the others
-            values = arc_values(front.value, share * open_value(joint))
-            for pitch in PITCHES:
-                contact = ContactPoint(handle, np.array([*(np.cos(pitch) * inward[:2]), -np.sin(pitch)]))
-                for roll in (0.0, pi) if abs(bar[2]) > 0.5 else (pi / 2, -pi / 2):
-                    for tilt in TILTS:
-                        turns = np.full(len(values), tilt)
-                        arc = Arc(front.name, joint, contact, values, turns, roll, -DEEPER, GRIP_OPENING, 0.0)
-                        motion = along_arc(self._robot.beliefs, self._robot.arm, arc, base, planner, tally)
-                        if motion is not None:
-                            return motion
-        return None
+        tried = (FAR_OUT, *SHARES) if front.slides else SHARES
+        shares = tried if front.alone else tried[:-1]  # of several, one that is half open hides the others
+        arcs = (
+            Arc(front.name, joint, contact, values, np.full(len(values), tilt), roll, -DEEPER, GRIP_OPENING, 0.0)
+            for values in (arc_values(front.value, share * open_value(joint)) for share in shares)
+            for pitch in PITCHES
+            for contact in (ContactPoint(handle, np.array([*(np.cos(pitch) * inward[:2]), -np.sin(pitch)])),)
+            for roll in ((0.0, pi) if abs(bar[2]) > 0.5 else (pi / 2, -pi / 2))
+            for tilt in TILTS
+        )
+        return first_along(self._robot.beliefs, self._robot.arm, arcs, (base,), planner, tally)
 
     def _planner(self) -> ArmPlanner:
         beliefs = self._robot.beliefs
@@ -382,16 +379,9 @@ class Pulling:
         heights = (max(min(0.45, (z0 + z1) / 2), z0), z1)
         contacts = push_points(joint, part, np.random.default_rng(5), 4, heights, opening=end > front.value)
         values = arc_values(front.value, end)
-        gap = self._robot.description.tip_overhang - PRESS
-        for contact in contacts:
-            for start, last in (*((t, t) for t in TILTS), *WIDE_TILTS):
-                for roll in (0.0, pi / 2):
-                    turns = np.linspace(start, last, len(values))
-                    arc = Arc(front.name, joint, contact, values, turns, roll, gap, 0.0, 0.0)
-                    motion = along_arc(self._robot.beliefs, self._robot.arm, arc, base, planner, tally)
-                    if motion is not None:
-                        return motion
-        return None
+        turns = [np.linspace(*ends, len(values)) for ends in (*((tilt, tilt) for tilt in TILTS), *WIDE_TILTS)]
+        arcs = pushes(front.name, joint, contacts, values, turns, self._robot.description.tip_overhang)
+        return first_along(self._robot.beliefs, self._robot.arm, arcs, (base,), planner, tally)
 
 
 def _position(at: np.ndarray) -> Position:
