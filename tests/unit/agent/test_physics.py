@@ -174,6 +174,26 @@ def test_what_is_too_wide_for_the_fingers_is_taken_by_its_rim() -> None:
     assert not grasps_of(Target(solid, "book", 0, -0.01), np.array([-0.6, 0.0, 0.0]), JAWS), "it has no rim"
 
 
+@pytest.mark.parametrize(("radius", "count"), [(0.0325, 1), (0.036, 1), (0.0395, 0)])
+def test_what_nearly_fills_the_hand_is_taken_all_the_same_and_wider_things_are_not(radius: float, count: int) -> None:
+    """Cans that a hand opens 15, 8 and 1 mm wider than, seen from one side and above with the noise of a near look."""
+    random = np.random.default_rng(3)
+    angle, height = random.uniform(np.pi / 2, 3 * np.pi / 2, 3000), random.uniform(0.0, 0.09, 3000)
+    side = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    spread = radius * np.sqrt(random.uniform(0, 1, 2000))
+    around = random.uniform(-np.pi, np.pi, 2000)
+    top = np.column_stack([spread * np.cos(around), spread * np.sin(around), np.full(2000, 0.09)])
+    points = np.concatenate([side, top]) + random.normal(0, 0.0005, (5000, 3)) + (1.0, 0.0, 0.73)
+    outward = np.concatenate(
+        [np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3000)]), np.tile([0.0, 0.0, 1.0], (2000, 1))]
+    )
+    can = Surface("can", points, outward, "white", 0.0, 2)
+    grasps = grasps_of(Target(can, "can", 0, 0.73), np.array([0.4, 0.0, 0.0]), JAWS)
+    across = [abs(float((pose[:2, 3] - (1.0, 0.0)) @ pose[:2, 1])) for pose in grasps if pose[2, 2] > -0.999]
+    assert len(grasps) >= count and (count or not across)
+    assert all(off < JAWS.opening / 2 - radius for off in across), "the fingers pass it on both sides"
+
+
 def test_a_level_hand_grips_what_it_saw_the_front_of_about_its_axis() -> None:
     angles = np.linspace(np.pi / 2, 3 * np.pi / 2, 60)  # the half that faces a hand that comes along x
     ring = 0.03 * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -9,7 +9,10 @@ from scenewright.stages.agent.world.physics.beliefs import Beliefs, Box, Hold
 from scenewright.stages.agent.world.physics.eyes import Surface
 from scenewright.stages.agent.world.physics.grasps import (
     FORWARD_PITCHES,
+    MARGIN,
+    PITCHES,
     STRAIGHT,
+    TIGHT,
     Jaws,
     antipodal_grasps,
     within_reach,
@@ -146,16 +149,17 @@ def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
     """Return the grasps of what was seen, map_from_tool (4, 4), that an arm on a base pose (3,) may get at."""
     surface = target.surface
     keep = _inside(surface)
-    heading = np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    if target.behind > 0:
-        grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], jaws, target.floor, FORWARD_PITCHES)
-        return within_reach(grasps, target.inward, STRAIGHT)
-    grasps = within_reach(antipodal_grasps(surface.points[keep], surface.normals[keep], jaws, target.floor), heading)
-    if grasps:
-        return grasps
+    points, normals = surface.points[keep], surface.normals[keep]
+    inside, heading = target.behind > 0, np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
+    pitches = FORWARD_PITCHES if inside else PITCHES
+    for margin in (MARGIN, TIGHT):
+        grasps = antipodal_grasps(points, normals, jaws, target.floor, pitches, margin)
+        grasps = within_reach(grasps, target.inward, STRAIGHT) if inside else within_reach(grasps, heading)
+        if grasps:
+            break
     # what is too wide for the fingers may have a rim: a bowl, a pot, a large cup
-    over_rim = rim_grasps(surface.points[keep], np.eye(4), np.random.default_rng(0))
-    return [grasp.body_from_tool for grasp in over_rim]
+    over_rim = [] if inside or margin == MARGIN else rim_grasps(points, np.eye(4), np.random.default_rng(0))
+    return grasps + [grasp.body_from_tool for grasp in over_rim]
 
 
 def _inside(surface: Surface) -> np.ndarray:
