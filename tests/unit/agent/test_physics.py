@@ -170,6 +170,8 @@ def test_what_is_too_wide_for_the_fingers_is_taken_by_its_rim() -> None:
     for pose in grasps:
         assert pose[2, 2] < -0.99, "from above"
         assert np.hypot(*(pose[:2, 3] - (1.0, 0.0))) == pytest.approx(0.088, abs=0.006), "over the wall"
+    away = [np.hypot(*(pose[:2, 3] - (0.4, 0.0))) for pose in grasps]
+    assert away == sorted(away) and away[0] < 0.52, "the wall near the robot first: it does not get to the far one"
     solid = Surface("book", random.uniform(-0.1, 0.1, (8000, 3)) * (1, 1, 0.1), bowl.normals, "white", 0.0, 1)
     assert not grasps_of(Target(solid, "book", 0, -0.01), np.array([-0.6, 0.0, 0.0]), JAWS), "it has no rim"
 

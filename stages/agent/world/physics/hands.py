@@ -159,7 +159,8 @@ def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
             break
     # what is too wide for the fingers may have a rim: a bowl, a pot, a large cup
     over_rim = [] if inside or margin == MARGIN else rim_grasps(points, np.eye(4), np.random.default_rng(0))
-    return grasps + [grasp.body_from_tool for grasp in over_rim]
+    walls = [grasp.body_from_tool for grasp in over_rim]  # the near one first: few are tried, and not all are in reach
+    return grasps + sorted(walls, key=lambda pose: float(np.hypot(*(pose[:2, 3] - base[:2]))))
 
 
 def _inside(surface: Surface) -> np.ndarray:
