@@ -56,6 +56,8 @@ TALL = 1.2
 """No arm gets over furniture of this height [m]: it is opened from anywhere before it. By eye."""
 DEEPER = (0.0, 0.07, 0.14)
 """Extra distances at which a base with a short arm stands before what is open [m], too, and at more places; by eye."""
+NEARER = (0.0, -0.08)
+"""The same before all else: the arm is short, and a chair may stand where it would be best. By eye."""
 ON_FLOOR = 0.2
 """Height below which things lie on the floor [m]; by eye."""
 
@@ -266,8 +268,10 @@ class OwnSkills(CommonSkills):
     def _before(self, place: str) -> list[tuple[float, Base]]:
         """Return the base poses along all sides of furniture that the robot can get to, the nearest first."""
         piece = self.scene.furniture[place]
-        offs = DEEPER if piece.opened and self._body.short_armed else (0.0,)
-        poses = [p for off in offs for p in around(piece, self._body.stand_off + off, APART / len(offs))]
+        opened, short = piece.opened, self._body.short_armed
+        offs: tuple[float, ...] = (DEEPER if opened else NEARER) if short else (0.0,)
+        apart = APART / len(DEEPER) if short and opened else APART
+        poses = [p for off in offs for p in around(piece, self._body.stand_off + off, apart)]
         return self._open(drivable(self.scene, self._body.base, poses))
 
     def navigate(self, target: SceneObject) -> Outcome:

@@ -19,9 +19,9 @@ TRIES = 6
 """Ways that are tried on one drive, each around what was touched on those before."""
 TOUCHES = 0.001
 """Contacts less deep do not count [m]."""
-STEP, BACK_STEPS = 0.05, 2
-"""Distance between poses of the base at which collisions are looked for [m], and how many of them it backs off a touch;
-by eye."""
+STEP, BACK_STEPS, TURN_STEP = 0.05, 2, 0.15
+"""Distance [m] and turn [rad] between poses of the base at which collisions are looked for, and how many of them it
+backs off a touch; by eye."""
 
 
 class Driving:
@@ -29,6 +29,8 @@ class Driving:
 
     def __init__(self, robot: RobotInRoom, seen: Seen) -> None:
         self._robot, self._seen = robot, seen
+        self._touched: np.ndarray | None = None
+        """Middle (2,), true room, of what it touched last with empty hands."""
 
     def drive(self, base: Base, toward: str) -> Felt:
         """Drive along the robot's own map; with empty hands it is moved and asked for contacts, not simulated."""
@@ -52,6 +54,8 @@ class Driving:
             failed = self._roll_along(start, rows)
             if failed is None:
                 break
+            if self._touched is not None and np.abs(self._robot.true_base() - start).max() < STEP / 2:
+                self._turn_from(self._touched)  # it does not get away as it stands
             self._robot.believed = self._robot.true_base() + self._robot.error
             if not points and number:
                 break  # it is there but for the turn
@@ -86,7 +90,7 @@ class Driving:
                 struck = next((name for name, depth in now.items() if depth > before.get(name, TOUCHES)), None)
                 before = now
                 if struck is not None:
-                    touched = self._remember(struck)
+                    touched = self._touched = self._remember(struck)
                     back = reached + (row - reached) * (k - 1) / count
                     self._robot.driver.put(Configuration(self._back_off(back, arm, touched), arm, opening))
                     class_name = self._robot.room.world.bodies[struck].record.class_name
@@ -123,6 +127,31 @@ class Driving:
                 break
             base, before = base + step, now
         return base
+
+    def _turn_from(self, touched: np.ndarray) -> None:
+        """Turn on the spot until the folded arm points away from what was touched (2,), or as far as that goes, to the
+        side that has more room."""
+        start = self._robot.true_base()
+        away = atan2(start[1] - touched[1], start[0] - touched[0])
+        short = (away - start[2] + pi) % (2 * pi) - pi
+        turns = [self._room_to_turn(start, turn) for turn in (short, short - np.copysign(2 * pi, short))]
+        base = start + (0.0, 0.0, min(turns, key=lambda turn: abs((turn - short + pi) % (2 * pi) - pi)))
+        arm, opening = self._robot.arm + self._robot.joint_error, self._robot.driver.robot.configuration().opening
+        self._robot.driver.put(Configuration(base, arm, opening))
+        self._robot.seconds_aside += 1.0
+
+    def _room_to_turn(self, start: np.ndarray, turn: float) -> float:
+        """Return how far a base (3,) turns on the spot, at most by an angle [rad], before it touches something."""
+        arm = self._robot.arm + self._robot.joint_error
+        self._robot.driver.robot.set_body(np.concatenate([start, arm]))
+        before, free = self._touching_depths(), 0.0
+        for yaw in np.linspace(0.0, turn, int(abs(turn) / TURN_STEP) + 2)[1:]:
+            self._robot.driver.robot.set_body(np.concatenate([start + (0.0, 0.0, yaw), arm]))
+            now = self._touching_depths()
+            if any(depth > before.get(name, TOUCHES) for name, depth in now.items()):
+                break
+            before, free = now, float(yaw)
+        return free
 
     def _touching_depths(self) -> dict[str, float]:
         """Return what the robot stands in, the floor aside, and how deep [m]."""

@@ -9,7 +9,7 @@ far it is open by the arm's joints. Which fronts a piece has is told in `front_s
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2
+from math import atan2, ceil
 
 import numpy as np
 from scenewright.schemas.base import Vector3, as_vector
@@ -40,8 +40,8 @@ WIDEST = 1.9
 """Angle to which a leaf opens [rad]."""
 NEAR_HINGE = 0.15
 """Points of a leaf this near to its hinge tell little of its angle [m]."""
-LOOK_AT = 0.6
-"""Height at which it is looked into, as a share of its own."""
+SEEN_AT_ONCE = 0.6
+"""Height of the inside that one look into it shows [m]: the wrist camera sees 54 degrees, from about so far. By eye."""
 NARROWEST = 0.25
 """Least width of a front that was looked at, and not its edge [m]; by eye."""
 EDGE_CELL = 0.01
@@ -177,11 +177,14 @@ class Front:
         """Whether a base pose (3,) of the map is on the side that the front is on."""
         return bool(self.local(np.array([[*base[:2], 0.0]]))[0, 0] > self.size[0] / 2)
 
-    def opening(self) -> Position:
-        """Return a place of the map in the middle of a shelf."""
+    def openings(self) -> list[Position]:
+        """Return places of the map in the middle of a shelf, at the heights at which it is looked into, the upper ones
+        first."""
         z0, z1 = (0.0, self.size[2]) if self.alone else self.panel[2:]
-        x, y, z = apply(self.map_from_front, np.array([(0.0, 0.0, z0 + LOOK_AT * (z1 - z0))]))[0]
-        return float(x), float(y), float(z)
+        count = max(1, ceil((z1 - z0) / SEEN_AT_ONCE))
+        heights = z1 - (np.arange(count) + 0.5) / count * (z1 - z0)
+        places = apply(self.map_from_front, np.column_stack([np.zeros((count, 2)), heights]))
+        return [(float(x), float(y), float(z)) for x, y, z in places]
 
     def of_part(self, points: np.ndarray, room: float) -> np.ndarray:
         """Return (N,) bool: points of the map that are of what moves, where it is now, or within `room` [m] of it."""

@@ -29,6 +29,8 @@ FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), 
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
 INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
 """Pitches [rad], distances and shifts aside [m] of looks into a shelf, in the order in which they are tried."""
+LOW = 1.1
+"""Furniture below this height is looked at from above as well, when it is open [m]; by eye."""
 PICTURE_SECONDS = 0.5
 """Time that a picture takes [s]. **Assumed.**"""
 
@@ -88,7 +90,8 @@ class Looking:
             self._seen.keep_shelf(piece)
         shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
         if shelf is not None and not shelf.slides:
-            arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)
+            over = arms if not close and shelf.size[2] < LOW else []  # what lies on its top is there still
+            arms = over + self._arms_into(shelf, [at] if close else shelf.openings(), close=close)
         elif close and self._robot.hold is None:
             arms += self._arms_at(at, STEEP, OVER, INTO_ASIDE[:1])
         if not arms:
@@ -153,11 +156,13 @@ class Looking:
         self._count_missed()
         return fuse(surfaces)
 
-    def _arms_into(self, shelf: Front, at: Position, *, close: bool) -> list[np.ndarray]:
-        """Return arms that hold the wrist camera before an open shelf; none where the robot does not stand there."""
+    def _arms_into(self, shelf: Front, places: list[Position], *, close: bool) -> list[np.ndarray]:
+        """Return arms that hold the wrist camera before places in an open shelf; none where the robot does not stand
+        there."""
         asides = INTO_ASIDE[:1] if close else INTO_ASIDE
-        can = self._robot.hold is None and shelf.before(self._robot.believed)
-        return [] if not can else self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)
+        if self._robot.hold is not None or not shelf.before(self._robot.believed):
+            return []
+        return [arm for at in places for arm in self._arms_at(at, INTO_PITCHES, INTO_FROM, asides)]
 
     def _arms_at(
         self, at: Position, pitches: tuple[float, ...], aways: tuple[float, ...], asides: tuple[float, ...]
