@@ -25,6 +25,7 @@ from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.kinematics import forward
+from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.kit.simulation.robot_description import load_robot
 
 JAWS = Jaws(0.08, (0.105, 0.033), 0.008)
@@ -78,6 +79,23 @@ def test_eyes_measure_and_the_hand_holds_by_contact(body: PhysicsBody) -> None:
     assert held is not None and held.label == "apple"
     assert body.release(seen["plate"].position, "plate", gently=True).ok
     assert body.bodies["apple_0"].on == "plate_0" and body.root("apple_0") == "table_0" and body.events[-1].ok
+
+
+@pytest.mark.parametrize("room_behind", [True, False])
+def test_a_robot_whose_arm_is_in_the_way_turns_before_it_drives_off(body: PhysicsBody, room_behind: bool) -> None:
+    """It stands before the table's edge with its folded arm over it, and drives along the edge: it turns away first,
+    or, between the table and something felt behind it, as far as it goes."""
+    edge = TABLE.centre[1] - TABLE.size[1] / 2
+    start = np.array([TABLE.centre[0], edge - 0.45, np.pi / 2])
+    driving, robot = body._driving, body._robot
+    robot.driver.put(Configuration(start, robot.arm + robot.joint_error, robot.description.opening))
+    if not room_behind:  # it may not turn far: half a metre of the way round is taken
+        away = driving._room_to_turn
+        driving._room_to_turn = lambda base, turn: float(np.clip(away(base, turn), -0.5, 0.5))  # type: ignore[method-assign]
+    driving._turn_from(np.array([start[0], edge]))
+    turned = abs((robot.true_base()[2] - start[2] + np.pi) % (2 * np.pi) - np.pi)
+    assert turned == pytest.approx(np.pi if room_behind else 0.5, abs=0.01)
+    assert np.allclose(robot.true_base()[:2], start[:2])
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "xarm7"])

@@ -180,6 +180,8 @@ def test_a_shelf_is_open_where_its_inside_was_seen() -> None:
     shelf = open_shelf("furniture_0", "shelf", (low, high), np.concatenate([before, boards]), base)
     assert shelf is not None and shelf.before(base) and shelf.inside(np.array([[0.5, 0.2, 0.7]]))[0]
     assert shelf.behind(np.array([0.5, 0.2, 0.7])) == pytest.approx(0.2)
+    heights = [place[2] for place in shelf.openings()]
+    assert heights == pytest.approx([0.9, 0.3]), "two looks: one shows but 60 cm of it"
     assert len(shelf.outline()) == 0 and not shelf.of_part(boards, 0.05).any()
     assert open_shelf("furniture_0", "shelf", (low, high), before, base) is None, "a plain block"
     assert open_shelf("furniture_0", "table", (low, high), boards, base) is None
