@@ -174,6 +174,8 @@ class RulesBrain:
             everywhere = goal.every or among
             needed = starts if goal.start else [beliefs.began] if everywhere and beliefs.began else []
             unseen = self._seen_less_than(self._style.thorough if everywhere else 1, needed)
+            if not unseen and goal.every and not goal.start and onto.labels[0] in FURNITURE:
+                unseen = self._seen_less_than(1, self._order())  # all of them may be anywhere
             if unseen:
                 return self._go_and_look(unseen[0])
         surely = beliefs.fitting(what)
@@ -248,13 +250,17 @@ class RulesBrain:
                 return self._call("Is it really used?", "report_observation", thing)
         if not beliefs.explored:
             return self._explore()
-        rooms = beliefs.rooms
-        order = places or sorted(rooms, key=lambda k: (rooms[k].door, rooms[k].label != "table", k != beliefs.at))
+        order = places or self._order()
         for rounds in range(1, self._style.rounds + 1):
             for place in self._seen_less_than(rounds, order):
                 if not notes[place].rejected:
                     return self._go_and_look(place)
         return self._not_found(what, sum(notes[place].looked > 0 for place in order))
+
+    def _order(self) -> list[str]:
+        """Return all furniture in the order in which it is looked at: tables first, what has doors last."""
+        rooms = self.beliefs.rooms
+        return sorted(rooms, key=lambda k: (rooms[k].door, rooms[k].label != "table", k != self.beliefs.at))
 
     def _not_found(self, what: Description, places: int) -> Reply:
         beliefs = self.beliefs
