@@ -174,10 +174,12 @@ def test_a_door_that_stands_open_is_known_by_where_it_is() -> None:
 def test_a_shelf_is_open_where_its_inside_was_seen() -> None:
     low, high = np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.4, 1.2])
     random = np.random.default_rng(0)
-    before = random.uniform((0, 0, 0), (1, 0.01, 1.2), (900, 3))
-    boards = random.uniform((0.1, 0.1, 0.6), (0.9, 0.3, 0.62), (300, 3))
+    before = random.uniform((0, 0, 0), (1, 0.01, 1.2), (4000, 3))
+    edges = before[(np.abs(before[:, 2] - 0.6) < 0.02) | (np.abs(before[:, 0] - 0.5) > 0.46)]
+    board = random.uniform((0, 0.1, 0.6), (1, 0.3, 0.62), (300, 3))
+    boards = np.concatenate([edges, board, random.uniform((0, 0.35, 0), (1, 0.38, 1.2), (900, 3))])
     base = np.array([0.5, -0.8, np.pi / 2])
-    shelf = open_shelf("furniture_0", "shelf", (low, high), np.concatenate([before, boards]), base)
+    shelf = open_shelf("furniture_0", "shelf", (low, high), boards, base)
     assert shelf is not None and shelf.before(base) and shelf.inside(np.array([[0.5, 0.2, 0.7]]))[0]
     assert shelf.behind(np.array([0.5, 0.2, 0.7])) == pytest.approx(0.2)
     heights = [place[2] for place in shelf.openings()]

@@ -25,9 +25,11 @@ from scenewright.stages.kit.geometry.transforms import apply, inverse, transform
 from scenewright.stages.kit.motion.doors import body_from_moved
 
 SHELVES = ("shelf",)
-INNER, SHOWS_INSIDE = 0.08, 0.1
-"""Distance from the outside from which on something is inside of furniture [m], and the least share of what was seen of
-a shelf that is there; by eye."""
+INNER, SHOWS_INSIDE = 0.08, 0.3
+"""Distance from the outside from which on something is inside of furniture [m], and the least share of a shelf's front
+through which something was seen there; by eye."""
+FRONT_CELL = 0.04
+"""Edge of a cell of a front in which that is told [m], as large as those in which furniture is kept."""
 OPEN = 1.5
 """How far what has no leaf counts as open [rad]."""
 Box = tuple[np.ndarray, np.ndarray]
@@ -79,17 +81,28 @@ def open_shelf(name: str, label: str, box: Box, points: np.ndarray, base: np.nda
     """Return the open side, towards a base pose (3,), of a shelf in a box of which points (N, 3) were seen; None where
     little of its inside was: it is shut, or a plain block."""
     (low, high), across = box, int((box[1] - box[0])[:2].argmin())
-    inner = np.all((points[:, :2] > low[:2] + INNER) & (points[:, :2] < high[:2] - INNER), axis=1)
-    inside = inner & (points[:, 2] < high[2] - INNER) & (points[:, 2] > INNER)
-    if label not in SHELVES or np.mean(inside) < SHOWS_INSIDE:
-        return None
     normal = np.zeros(2)
     normal[across] = 1.0 if base[across] > (low + high)[across] / 2 else -1.0
+    if label not in SHELVES or _seen_through(box, points, across, normal[across]) < SHOWS_INSIDE:
+        return None
     frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*((low + high)[:2] / 2), 0.0]))
     depth, width, top = (float(value) for value in ((high - low)[across], (high - low)[1 - across], high[2]))
     corner = (depth / 2, width / 2, LEAF)
     panel = (-width / 2, width / 2, LEAF, top)
     return Front(name, label, frame, (depth, width, top), panel, (corner, corner), False, OPEN, leafless=True)
+
+
+def _seen_through(box: Box, points: np.ndarray, across: int, side: float) -> float:
+    """Return the share of a front's cells, its edges aside, in which points (N, 3) lie inside of furniture and none on
+    its front: at the upper (`side` 1) or lower (-1) end of an axis."""
+    low, high = box
+    axes = [1 - across, 2]
+    within = np.all((points[:, axes] > low[axes] + INNER) & (points[:, axes] < high[axes] - INNER), axis=1)
+    behind = (high[across] - points[:, across] if side > 0 else points[:, across] - low[across]) > INNER
+    cells = np.rint(points[:, axes] / FRONT_CELL).astype(int)
+    on_front = set(map(tuple, cells[within & ~behind].tolist()))
+    inside = set(map(tuple, cells[within & behind].tolist())) - on_front
+    return len(inside) / max(1, len(inside) + len(on_front))
 
 
 def _beside(surface: Surface, box: Box) -> bool:
