@@ -180,6 +180,20 @@ def test_empty_worlds_and_walls_are_answered(apartment: Apartment, words: str, e
         assert (session.end, why in session.words) == (end, True), session.words
 
 
+def test_all_of_a_kind_are_those_of_the_whole_place() -> None:
+    """A cup is where all cups belong, and another one on furniture that nobody named."""
+    bench = Furniture(name="bench", label="bench", centre=(3.2, 0.6), size=(1.2, 0.5), height=0.45)
+    things = (
+        Thing(name="c", label="cup", on="t", at=(2, 2.6)),
+        Thing(name="d", label="cup", on="bench", at=(3.2, 0.6)),
+    )
+    words = "put all cups on the table"
+    session, world = run_trial(
+        Setting(empty(TABLE, bench, things=things), words, goals_of(words), NOTHING_FAILS, 0), "ours"
+    )
+    assert session.end == "done" and {world.root(name) for name in ("c", "d")} == {"t"}
+
+
 class Drops(FastWorld):
     """A world in which the first thing that is placed is never seen again."""
 
