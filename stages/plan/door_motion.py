@@ -57,7 +57,6 @@ def plan_close(
         if second is not None:
             return first, second
     tally.raise_for(f"close({joint_name})", (body, joint_name))
-    raise AssertionError("unreachable")
 
 
 def plan_open(
@@ -79,7 +78,6 @@ def plan_open(
         if plan is not None:
             return (plan,)
     tally.raise_for(f"open({joint_name})", (body, joint_name))
-    raise AssertionError("unreachable")
 
 
 def _candidate_bases(search: JointSearch, points: np.ndarray) -> np.ndarray:

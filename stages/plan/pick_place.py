@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.attempts import first_motion
 from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
@@ -225,11 +225,10 @@ def plan_pick(
     if preferred is not None:
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     attempts = (_try_pick(model, state, item, source, at, grasp, arm_planner, tally) for at, grasp in queue)
-    motion = _first_motion(attempts, budgets.paths)
+    motion = first_motion(attempts, budgets.paths)
     if motion is not None:
         return motion
     tally.raise_for(f"pick({item}, {source})", (item, source))
-    raise AssertionError("unreachable")
 
 
 def _twist(model: WorldModel, item: str, grasp: Grasp) -> float:
@@ -238,18 +237,6 @@ def _twist(model: WorldModel, item: str, grasp: Grasp) -> float:
     tool_from_middle = inverse(model.pose(item) @ grasp.body_from_tool) @ model.world.center_of_mass(item)
     lever = float(np.hypot(tool_from_middle[0, 3], tool_from_middle[2, 3]))
     return round(GRAVITY * model.records[item].mass * lever, 1)
-
-
-def _first_motion(attempts: Iterator[Manipulation | MotionFailed | None], searches: int) -> Manipulation | None:
-    """Return the first of the attempts that is a motion, made one by one until `searches` for a path have failed."""
-    for attempt in attempts:
-        if isinstance(attempt, Manipulation):
-            return attempt
-        if attempt is not None:
-            searches -= 1
-            if searches == 0:
-                break
-    return None
 
 
 def _try_pick(
@@ -422,11 +409,10 @@ def plan_place(
         queue += [(at, placement) for at in bases]
     queue = wish + queue[: budgets.pairs] if serves else queue[: budgets.pairs] + wish
     attempts = (_try_place(model, state, item, target, at, placement, arm_planner, tally) for at, placement in queue)
-    motion = _first_motion(attempts, budgets.paths)
+    motion = first_motion(attempts, budgets.paths)
     if motion is not None:
         return motion
     tally.raise_for(f"place({item}, {target})", (item, target))
-    raise AssertionError("unreachable")
 
 
 def _liftable_places(

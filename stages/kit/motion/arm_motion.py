@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 import numpy as np
 from scenewright.stages.kit.acting.query import CollisionQuery
@@ -51,7 +51,7 @@ class Tally:
         for name in failure.failure.objects[-1:]:
             self.blockers[name] += 1
 
-    def raise_for(self, what: str, objects: tuple[str, ...]) -> None:
+    def raise_for(self, what: str, objects: tuple[str, ...]) -> NoReturn:
         """Raise MotionFailed with the condition that ended most attempts.
 
         `no_inverse_kinematics` (nothing was within reach), `goal_in_collision` (a body was in the way most often) or

@@ -17,6 +17,7 @@ from scenewright.stages.agent.world.physics.grasps import (
     antipodal_grasps,
     within_reach,
 )
+from scenewright.stages.kit.acting.hand.attempts import first_motion
 from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
@@ -41,6 +42,8 @@ SLOW = 0.35
 """Pace of the hand near things, and with something in it."""
 ELBOWS = 12
 """Ways to hold the elbow that are tried where the first is in the way."""
+SEARCHES = 2
+"""Most path searches that fail before a grasp is given up; by eye."""
 SAMPLES = 500
 """Most samples of one path search; by eye."""
 
@@ -119,22 +122,11 @@ def plan_grasp(
     left_out = target.rank * NEXT % len(possible)  # where few are possible, the first has its turn again
     grasps = (possible[left_out:] + possible[:left_out])[:CANDIDATES]
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
-    searches = 2
-    for grasp in grasps:
-        try:
-            motion = _one_grasp(planner, base, arm, target, grasp, tally)
-        except MotionFailed as failed:
-            tally.failed(failed)
-            searches -= 1
-            if not searches:
-                break
-            continue
-        finally:
-            beliefs.hold(None)
-        if motion is not None:
-            return motion
-    tally.raise_for(f"grasp({name})", (name,))
-    raise AssertionError("unreachable")
+    attempts = (_one_grasp(planner, base, arm, target, grasp, tally) for grasp in grasps)
+    motion = first_motion(attempts, SEARCHES)
+    if motion is None:
+        tally.raise_for(f"grasp({name})", (name,))
+    return motion
 
 
 def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.random.Generator) -> bool:
@@ -184,14 +176,34 @@ def whole_box(target: Target) -> Box:
 
 def _one_grasp(
     planner: ArmPlanner, base: np.ndarray, arm: np.ndarray, target: Target, map_from_tool: np.ndarray, tally: Tally
-) -> Motion | None:
+) -> Motion | MotionFailed | None:
     beliefs = planner.model
     assert isinstance(beliefs, Beliefs)
-    opening = beliefs.description.opening
     approach_and_lift = _way_in(planner, base, arm, target, map_from_tool, tally)
     if approach_and_lift is None:
         return None
-    approach, lift = approach_and_lift
+    try:
+        return _taken_along(beliefs, planner, base, arm, target, map_from_tool, *approach_and_lift, tally)
+    except MotionFailed as failed:
+        tally.failed(failed)
+        return failed
+    finally:
+        beliefs.hold(None)
+
+
+def _taken_along(
+    beliefs: Beliefs,
+    planner: ArmPlanner,
+    base: np.ndarray,
+    arm: np.ndarray,
+    target: Target,
+    map_from_tool: np.ndarray,
+    approach: np.ndarray,
+    lift: np.ndarray,
+    tally: Tally,
+) -> Motion:
+    """Return the motion of a grasp with its ways in (N, J) and up (M, J). Raises MotionFailed."""
+    opening = beliefs.description.opening
     reach = planner.path(base, arm, approach[-1])
     low, high = whole_box(target)
     box = np.eye(4)

@@ -199,7 +199,6 @@ class Pulling:
                 value = self._carry_out(front, motion)
                 return value if front.slides else self._push_on(name, value)
         tally.raise_for(f"open({front.name})", (front.name,))
-        raise AssertionError("unreachable")
 
     def _push_on(self, name: str, value: float) -> float:
         """Push a leaf that came less far than it should on from inside, as long as that gets it on: half open it is in
