@@ -24,7 +24,7 @@ UNLIKE = 0.8
 """What is narrower than this share of a carrier is a thing on it, not the carrier."""
 TWICE = 0.5
 """Share of the distance of one thing within which a second detection of one look is of it as well; by eye."""
-CARRIES = 0.09
+CARRIES, GOES_ON = 0.065, 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
 TOP = 0.08
 """What lies no farther than this below the top of furniture is on it [m]; by eye."""
@@ -263,7 +263,7 @@ class SceneMap:
 
 def classes_not_of(radius: float) -> tuple[str, ...]:
     """Return the classes that a thing of a radius [m] is too narrow or too wide for."""
-    return CARRIERS if radius < CARRIES else SMALL
+    return (*(CARRIERS if radius < CARRIES else ()), *(SMALL if radius >= GOES_ON else ()))
 
 
 def _faces(base: Base, piece: SeenFurniture) -> bool:

@@ -405,6 +405,9 @@ def test_a_box_has_corners_and_a_plate_has_none() -> None:
     assert scene.at_carrier((0.3 + 0.11, 0.4, 0.8), place) == ""
     assert scene.at_carrier((1.1 + 0.083, 0.4 + 0.083, 0.8), place) == ""
     assert "plate" in classes_not_of(0.04) and "doll" not in classes_not_of(0.04) and "doll" in classes_not_of(0.13)
+    assert not {"plate", "apple"} & set(classes_not_of(0.08)), (
+        "a small plate is one, and what is as wide may lie on one"
+    )
 
 
 def test_floor_under_what_fell_is_no_furniture_to_go_to() -> None:
