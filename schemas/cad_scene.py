@@ -75,6 +75,17 @@ class Inferred(Model):
     """Corners of the convex pieces that are added, world frame [m]. All of their faces are inferred, none was seen."""
 
 
+class Explained(Model):
+    """How much of the surface that was seen of a thing lies near what stands for it, by area (`explained_within`)."""
+
+    area: float
+    """Of what was seen [m²]."""
+    by_model: float
+    """Share that lies near the chosen model; 0 where it keeps its mesh."""
+    by_mesh: float
+    """Share that lies near its own mesh: 1 but for a mesh that was moved farther; 0 where a model stands for it."""
+
+
 class Replacement(Model):
     """What stands for one graph node."""
 
@@ -94,6 +105,8 @@ class Replacement(Model):
     """Reason -> number of candidates discarded."""
     inferred: Inferred | None = Field(default=None, exclude_if=lambda inferred: inferred is None)
     """What is added to the mesh. Absent where it stands as it was seen, and where it need not."""
+    explained: Explained | None = Field(default=None, exclude_if=lambda explained: explained is None)
+    """How much of what was seen of it that explains. Absent for layout, and where nobody asked (older scenes)."""
     joint_evidence: dict[str, JointEvidence] | None = Field(default=None, exclude_if=lambda evidence: evidence is None)
     """Joint of the chosen model -> why it is believed. Absent where nobody asked (older scenes, `--method thesis`):
     then all joints are."""
@@ -111,6 +124,8 @@ class Replacement(Model):
 
 SURROUNDINGS = "surroundings"
 """The body that is made of what was mapped and has no name; it is no node of the graph."""
+UNEXPLAINED = "unexplained.ply"
+"""The surface of the map that no model, mesh, layout or surroundings of the scene lies near to."""
 
 
 class CadSceneFile(Model):
@@ -122,13 +137,16 @@ class CadSceneFile(Model):
     conflicts_after: int
     iterations: int
     """Steps of min-conflicts."""
+    explained_within: float | None = Field(default=None, exclude_if=lambda distance: distance is None)
+    """Surface so near is explained [m]: 2 cm and as much as depth spreads about planes of the map."""
 
 
 class CadScene(Artifact):
     """`scene.json`, `graph.json` (cg': the contact graph with model, pose, scale, joints per node, boxes and
     planes of the CAD models), `models/<id>/` (copies of the chosen library models), `meshes/<node>.ply` (nodes
     that keep their mesh), `layout/<node>.ply`, `meshes/surroundings.ply` (what the map shows and
-    has no name; absent when there is nothing), `edits.json` (what became of each edit, where people put it right)."""
+    has no name; absent when there is nothing), `unexplained.ply` (what the map shows and nothing in the scene lies
+    near to; absent when there is nothing), `edits.json` (what became of each edit, where people put it right)."""
 
     kind: ClassVar[str] = "cad_scene"
     description: ClassVar[str] = "CAD replacement: model, pose, scale, errors and alternatives per node"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from scenewright.cli.explaining.reason import Reason, Reasons, counted, edit_reasons, length, listed, merged
-from scenewright.schemas.cad_scene import CadCandidate, CadScene, JointEvidence, Replacement
+from scenewright.cli.explaining.reason import Reason, Reasons, counted, edit_reasons, length, listed, merged, percent
+from scenewright.schemas.cad_scene import CadCandidate, CadScene, Explained, JointEvidence, Replacement
 from scenewright.stages.kit.measurement.cad_candidates import candidates_of
 
 MOST_OTHERS = 3
@@ -50,6 +50,8 @@ def replacement_reasons(entry: Replacement) -> Iterator[Reason]:
         yield Reason(f"The model {chosen.model_id}{stretched} stands for it. {_fit(chosen)}", _facts(entry))
         if entry.reason:
             yield Reason(f"The reason: {entry.reason}.", {"reason": entry.reason})
+    if entry.explained is not None:
+        yield _explained(entry.explained)
     listed_candidates = candidates_of(entry)
     best = entry.best_single
     if chosen is not None and best is not None and best.library_model != chosen.library_model:
@@ -103,6 +105,13 @@ def _others(entry: Replacement, candidates: list[CadCandidate]) -> Iterator[Reas
 def _fit(candidate: CadCandidate) -> str:
     error = length(candidate.alignment_error)
     return f"It lies {error} (RMS) from what was seen, its matching error is {candidate.matching_error:.2f}."
+
+
+def _explained(explained: Explained) -> Reason:
+    by_model, by_mesh = percent(explained.by_model), percent(explained.by_mesh)
+    says = f"Of the {explained.area:.2f} m² that were seen of it, "
+    says += f"its own mesh explains {by_mesh}." if explained.by_mesh else f"the model explains {by_model}."
+    return Reason(says, {"explained": explained.model_dump(mode="json")})
 
 
 def _facts(entry: Replacement) -> dict[str, object]:

@@ -10,6 +10,7 @@ from scenewright.schemas.scene_parts import TREE_RELATIONS
 from scenewright.stages.cad.arranging import Arrangement, shifted_box
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.conflicts import Selection
+from scenewright.stages.cad.explaining import Explanation
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.placing import placed_box, placed_planes
 from scenewright.stages.cad.shapes import Placement
@@ -38,6 +39,7 @@ def scene_file(
     colors: dict[str, dict[str, tuple[int, int, int]]],
     evidence: dict[str, dict[str, JointEvidence]],
     inferred: dict[str, Inferred],
+    explanation: Explanation,
     selection: Selection,
     conflicts_after: int,
 ) -> CadSceneFile:
@@ -62,6 +64,7 @@ def scene_file(
                     part_colors=colors[node.id],
                     alternatives=tuple(others),
                     rejected=entry.rejected,
+                    explained=explanation.things.get(node.id),
                     joint_evidence=evidence.get(node.id),
                 )
             )
@@ -71,13 +74,21 @@ def scene_file(
             reason = f"{entry.reason}; moved by {1000 * went:.0f} mm" if went > 5e-4 else entry.reason
             added = inferred.get(node.id)
             replacements.append(
-                Replacement(node=node.id, decision="mesh", reason=reason, rejected=entry.rejected, inferred=added)
+                Replacement(
+                    node=node.id,
+                    decision="mesh",
+                    reason=reason,
+                    rejected=entry.rejected,
+                    inferred=added,
+                    explained=explanation.things.get(node.id),
+                )
             )
     return CadSceneFile(
         replacements=tuple(replacements),
         conflicts_before=selection.conflicts_before,
         conflicts_after=conflicts_after,
         iterations=selection.steps,
+        explained_within=explanation.within,
     )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.articulations import Articulation, Articulations
 from scenewright.schemas.cad_library import CadLibrary, CadModel
-from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene, JointEvidence
+from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadScene, JointEvidence
 from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.panoptic_map import PanopticMap
@@ -23,6 +23,8 @@ from scenewright.stages.cad.choosing import adjust, select
 from scenewright.stages.cad.coloring import part_colors
 from scenewright.stages.cad.completing import completed, hulls_of
 from scenewright.stages.cad.conflicts import placed_pieces
+from scenewright.stages.cad.explained import shares_of
+from scenewright.stages.cad.explaining import explanation_of
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
 from scenewright.stages.cad.method import CadMethod
 from scenewright.stages.cad.model_surfaces import ModelSurface, load_surface
@@ -34,7 +36,7 @@ from scenewright.stages.cad.records import cad_graph, scene_file
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.stretching import source_of, with_stretched, write_stretched
 from scenewright.stages.cad.surroundings import footing
-from scenewright.stages.cad.surroundings_files import area_of, surroundings_of, write_surface
+from scenewright.stages.cad.surroundings_files import rounded_area, surroundings_of, write_surface
 from scenewright.stages.cad.target import Surroundings, Target
 from scenewright.stages.cad.thesis import Thesis
 from scenewright.stages.kit.formats.cad_models import model_folder
@@ -123,7 +125,12 @@ def choose_and_write(
             write_surface(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
         evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
-        scene = scene_file(graph, shortlists, arranged, colors, evidence, inferred, selection, conflicts_after)
+        explanation = explanation_of(graph, panoptic_map, arranged, surfaces, context.output)
+        if explanation.rest is not None:
+            write_surface(explanation.rest, context.output / UNEXPLAINED)
+        scene = scene_file(
+            graph, shortlists, arranged, colors, evidence, inferred, explanation, selection, conflicts_after
+        )
         scene.write(context.output / "scene.json")
         final.write(context.output / "graph.json")
         copy_models(arranged, library, context)
@@ -138,7 +145,9 @@ def choose_and_write(
         "completed": sum(bool(added.pieces) for added in inferred.values()),
         "conflicts_before": scene.conflicts_before,
         "conflicts_after": scene.conflicts_after,
-        "surroundings_m2": 0.0 if nameless is None else round(area_of(nameless), 2),
+        "surroundings_m2": rounded_area(nameless),
+        **shares_of(explanation.things),
+        "unexplained_m2": rounded_area(explanation.rest),
         "joints": sum(len(joint_grounds) for joint_grounds in evidence.values()),
         "joints_moved": sum(
             "moved" in entry.grounds for joint_grounds in evidence.values() for entry in joint_grounds.values()
