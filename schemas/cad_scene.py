@@ -23,6 +23,11 @@ class CadCandidate(Model):
     """Equation 2.7."""
     alignment_error: float
     """Root mean square distance from object vertices to the CAD surface [m]."""
+    score: float | None = Field(default=None, exclude_if=lambda score: score is None)
+    """What the choice minimises [m]: the alignment error, and what it costs that points do not tell. In older scenes
+    absent."""
+    explained: float | None = Field(default=None, exclude_if=lambda share: share is None)
+    """Share of what was seen that it explains where it is; of what was chosen and the next two models."""
     stretched_from: Name | None = Field(default=None, exclude_if=lambda source: source is None)
     """The model of the library that it was stretched from; None, and absent from the file, where it is one itself."""
 
@@ -86,6 +91,23 @@ class Explained(Model):
     """Share that lies near its own mesh: 1 but for a mesh that was moved farther; 0 where a model stands for it."""
 
 
+Way = Literal["library", "stretched", "by_shape", "built_in"]
+"""How something is sought that may stand for a thing: a model of the library of its class; one stretched along its own
+axes; one of the class that its shape tells; boxes made for it."""
+
+
+class Tried(Model):
+    """What came of one way."""
+
+    way: Way
+    because: str
+    """Why it gives this, or nothing; empty where nothing is to be said."""
+    model_id: Name | None = None
+    """What it puts first; None where it gives nothing new."""
+    score: float | None = None
+    """What that costs [m]: what the choice among candidates minimises."""
+
+
 class Replacement(Model):
     """What stands for one graph node."""
 
@@ -103,6 +125,10 @@ class Replacement(Model):
     alternatives: tuple[CadCandidate, ...] = ()
     rejected: dict[str, int] = {}
     """Reason -> number of candidates discarded."""
+    tries: tuple[Tried, ...] = Field(default=(), exclude_if=lambda tries: not tries)
+    """In which ways something was sought, in order; where none gave anything, its own mesh stays."""
+    stays: str = Field(default="", exclude_if=lambda words: not words)
+    """Why it is held where it stands, or free to move, as far as the scene says; `urdf` may know better."""
     inferred: Inferred | None = Field(default=None, exclude_if=lambda inferred: inferred is None)
     """What is added to the mesh. Absent where it stands as it was seen, and where it need not."""
     explained: Explained | None = Field(default=None, exclude_if=lambda explained: explained is None)
