@@ -91,9 +91,9 @@ class Explained(Model):
     """Share that lies near its own mesh: 1 but for a mesh that was moved farther; 0 where a model stands for it."""
 
 
-Way = Literal["library", "stretched", "by_shape", "built_in"]
+Way = Literal["library", "stretched", "by_shape", "family", "built_in"]
 """How something is sought that may stand for a thing: a model of the library of its class; one stretched along its own
-axes; one of the class that its shape tells; boxes made for it."""
+axes; one of the class that its shape tells; parts of a family of furniture; boxes made for it."""
 
 
 class Tried(Model):

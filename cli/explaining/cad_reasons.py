@@ -15,6 +15,7 @@ WAYS = {
     "library": "Models of the library of its class",
     "stretched": "Models stretched along their own axes",
     "by_shape": "Models of the class that its shape tells",
+    "family": "Parts of a family of furniture, fitted to it",
     "built_in": "Boxes made for it",
 }
 """Ways of seeking what stands for a thing."""

@@ -11,10 +11,11 @@ import numpy as np
 from scenewright.schemas.articulations import Articulation
 from scenewright.schemas.cad_scene import Tried
 from scenewright.schemas.contact_graph import ContactGraphFile
-from scenewright.stages.cad.built_ins import built_in, is_built_in
+from scenewright.stages.cad.built_ins import built_in
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.choosing import may_touch
 from scenewright.stages.cad.conflicts import placed_solid
+from scenewright.stages.cad.made_models import is_built_in
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.placing import placed_box

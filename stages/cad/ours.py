@@ -64,6 +64,7 @@ class Ours:
             "library": True,
             "stretched": self.parameters.stretched,
             "by_shape": self.parameters.recognition_error > 0,
+            "family": self.parameters.families,
             "built_in": self.parameters.built_ins,
         }
         return tuple(way for way, is_asked in asked.items() if is_asked)

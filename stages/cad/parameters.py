@@ -96,6 +96,10 @@ class CadParameters(Parameters):
     built_ins: bool = Field(
         True, description="ours: replace an object without model by boxes fitted to it, where these explain its surface"
     )
+    families: bool = Field(
+        True,
+        description="ours: build a table, chair or shelf of parts fitted to its surface where no model explains it",
+    )
     stretched: bool = Field(
         True, description="ours: stretch a model along its own axes where none has the size of the object"
     )

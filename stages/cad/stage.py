@@ -17,7 +17,6 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.arranging import Arrangement
 from scenewright.stages.cad.building_in import colliding_built_ins, yielded
-from scenewright.stages.cad.built_ins import is_built_in
 from scenewright.stages.cad.candidates import Shortlist, models_for, object_points
 from scenewright.stages.cad.choosing import adjust, select
 from scenewright.stages.cad.coloring import part_colors
@@ -26,6 +25,7 @@ from scenewright.stages.cad.conflicts import placed_pieces
 from scenewright.stages.cad.explained import shares_of
 from scenewright.stages.cad.explaining import explanation_of
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
+from scenewright.stages.cad.made_models import is_built_in, is_of_family
 from scenewright.stages.cad.method import CadMethod
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.obstacles import floor_levels, obstacles_of
@@ -136,10 +136,12 @@ def choose_and_write(
         final.write(context.output / "graph.json")
         copy_models(arranged, library, context)
 
+    of_families = sum(is_of_family(placement.shape.model) for placement in arranged.placements.values())
     decisions = [replacement.decision for replacement in scene.replacements]
     errors = [placement.alignment_error for placement in arranged.placements.values()]
     summary = {
-        "cad": decisions.count("cad") - len(built),
+        "cad": decisions.count("cad") - len(built) - of_families,
+        "of_families": of_families,
         "built_in": len(built),
         "mesh": decisions.count("mesh"),
         "layout": decisions.count("layout"),
@@ -174,6 +176,8 @@ def find_candidates(
     built-ins are written into the output. `moved`: what the log shows in two states."""
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
     free_space, named_by_hand = method.free_space(panoptic_map), named_by_people(panoptic_map)
+    because = panoptic_map.because
+    said = {} if because is None else {entity.instance: entity.said for entity in because.entities}
     shortlists: dict[str, Shortlist] = {}
     for node in context.progress.track(objects, description="objects"):
         if node.mesh is None:
@@ -195,7 +199,8 @@ def find_candidates(
             context.random(VERTICES, node.instance),
         )
         target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
-        thing = Thing(target, mesh, library, moved, node.id in named_by_hand, context.output / "models")
+        words, by_hand = said.get(node.instance, {}), node.id in named_by_hand
+        thing = Thing(target, mesh, library, moved, words, by_hand, context.output / "models")
         shortlists[node.id] = sought(thing, method)
     return shortlists
 
@@ -211,7 +216,7 @@ def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) ->
         source = source_of(model)
         if source is not None:
             write_stretched(model, model_folder(library, source), folder / model_id)
-        elif not is_built_in(model):
+        elif not is_built_in(model) and not is_of_family(model):
             shutil.copytree(model_folder(library, model_id), folder / model_id)
 
 

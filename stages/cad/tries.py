@@ -15,6 +15,7 @@ from scenewright.schemas.cad_scene import Tried, Way
 from scenewright.stages.cad.building_in import built_in_instead
 from scenewright.stages.cad.built_ins import may_be_built_in
 from scenewright.stages.cad.candidates import Shortlist, shortlist
+from scenewright.stages.cad.families.stand_in import of_family
 from scenewright.stages.cad.method import CadMethod
 from scenewright.stages.cad.model_surfaces import ModelSurface, load_surface
 from scenewright.stages.cad.recognition import is_doubtful, might_be, recognised
@@ -34,6 +35,8 @@ class Thing:
     library: CadLibrary
     moved: Sequence[Articulation]
     """What the log shows in two states."""
+    said: Mapping[str, float]
+    """Class -> mean score that masks gave it a look."""
     named_by_hand: bool
     """Whether somebody gave it its class."""
     made: Path
@@ -94,6 +97,12 @@ def _by_shape(entry: Shortlist, thing: Thing, method: CadMethod) -> tuple[Shortl
     return renamed, "no one class fits well, and by far better than all others" if renamed is entry else ""
 
 
+def _of_family(entry: Shortlist, thing: Thing, method: CadMethod) -> tuple[Shortlist, str]:
+    target, mesh, may_rename = thing.target, thing.mesh, not thing.named_by_hand
+    made = of_family(entry, target, mesh, thing.said, method.parameters, thing.made, may_rename=may_rename)
+    return (entry, made) if isinstance(made, str) else (made, "")
+
+
 def _built_in(entry: Shortlist, thing: Thing, method: CadMethod) -> tuple[Shortlist, str]:
     if entry.placements:
         return entry, "a model fits it"
@@ -107,6 +116,7 @@ SEEKERS: Mapping[Way, Seek] = {
     "library": _in_library,
     "stretched": _stretched,
     "by_shape": _by_shape,
+    "family": _of_family,
     "built_in": _built_in,
 }
 """In the order in which they are tried."""

@@ -159,7 +159,7 @@ def test_what_was_tried_is_told_in_order(scene):
         if entry.decision == "layout":
             assert entry.tries == () and entry.stays == ""
             continue
-        assert [tried.way for tried in entry.tries] == ["library", "stretched", "by_shape", "built_in"]
+        assert [tried.way for tried in entry.tries] == ["library", "stretched", "by_shape", "family", "built_in"]
         assert all(tried.because or tried.model_id for tried in entry.tries)
         assert entry.stays.startswith(("held: ", "free: "))
     chosen = [entry.chosen for entry in by_node.values() if entry.chosen is not None]
