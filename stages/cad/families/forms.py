@@ -96,8 +96,11 @@ class Reading:
     def seen_through(self, board: Piece) -> bool:
         """Whether cameras saw that there is room below a board."""
         low, high = board.corners.min(axis=0), board.corners.max(axis=0)
-        first = np.array([*(low[:2] + ASIDE), self.base + APRON])
-        last = np.array([*(high[:2] - ASIDE), low[2] - APRON])
+        return self.seen_into(np.array([*low[:2], self.base]), np.array([*high[:2], low[2]]))
+
+    def seen_into(self, low: np.ndarray, high: np.ndarray) -> bool:
+        """Whether cameras saw that there is room between two corners (3,)."""
+        first, last = low + (ASIDE, ASIDE, APRON), high - (ASIDE, ASIDE, APRON)
         return bool(np.all(last > first)) and self.filled(box_piece("room", first, last).corners) >= SEEN_THROUGH
 
     def has_room(self, piece: Piece) -> bool:
