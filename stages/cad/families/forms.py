@@ -19,8 +19,9 @@ what is inferred, none."""
 SEEN_THROUGH, ASIDE, APRON = 0.1, 0.05, 0.1
 """Below a top, this share of the room was seen empty, so far from its edges and from top and ground [m]: what nobody
 saw through may be a box."""
-SPACING = 0.02
-"""Distance of the points at which a piece is held against seen space [m]: a voxel of a map."""
+SPACING, COARSE = 0.02, 0.05
+"""Distance of the points at which a piece, and the room below a top, is held against seen space [m]: a voxel of a map
+for what may be thin."""
 
 
 @dataclass(frozen=True)
@@ -86,9 +87,10 @@ class Reading:
         """Return it in another frame: `turn` (3, 3), world from that frame."""
         return replace(self, patches=self.patches.turned(self.turn.T @ turn), turn=turn)
 
-    def filled(self, corners: np.ndarray) -> float:
-        """Return the share of a convex piece, corners (N, 3), that lies in space that was seen empty."""
-        points = inside_points(corners, SPACING)
+    def filled(self, corners: np.ndarray, spacing: float = SPACING) -> float:
+        """Return the share of a convex piece, corners (N, 3), that lies in space that was seen empty, by points at most
+        `spacing` [m] apart."""
+        points = inside_points(corners, spacing)
         if len(points) == 0:
             return 0.0
         return float(np.mean(self.free_space.is_empty(points @ self.turn.T, self.own)))
@@ -101,7 +103,9 @@ class Reading:
     def seen_into(self, low: np.ndarray, high: np.ndarray) -> bool:
         """Whether cameras saw that there is room between two corners (3,)."""
         first, last = low + (ASIDE, ASIDE, APRON), high - (ASIDE, ASIDE, APRON)
-        return bool(np.all(last > first)) and self.filled(box_piece("room", first, last).corners) >= SEEN_THROUGH
+        return (
+            bool(np.all(last > first)) and self.filled(box_piece("room", first, last).corners, COARSE) >= SEEN_THROUGH
+        )
 
     def has_room(self, piece: Piece) -> bool:
         """Whether a piece does not lie in space that was seen empty."""
