@@ -69,8 +69,8 @@ def _told(way: Way, before: Shortlist, after: Shortlist, why_not: str) -> Tried:
     if why_not or not after.placements or after.placements is before.placements:
         return Tried(way=way, because=why_not or after.reason)
     best = after.placements[0]
-    count = len(after.placements) - len(before.placements) * (way == "stretched")
-    because = f"{count} fit, the best costs {1000 * best.score:.0f} mm" if count > 1 else after.reason
+    count = len(after.placements)
+    because = f"{count} fit, the best costs {1000 * best.score:.0f} mm" if way == "library" else after.reason
     return Tried(way=way, because=because, model_id=best.shape.model.id, score=round(best.score, 6))
 
 

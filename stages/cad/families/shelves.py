@@ -70,8 +70,8 @@ def _heights(reading: Reading) -> list[float]:
     places = [*levels(patches), *((z + THICK, area) for z, area in below)]
     largest = max((area for _, area in places), default=0.0)
     places = [(z, area) for z, area in places if area >= ALIKE * largest]
-    heights: list[float] = list(reading.carrying)
-    for z, _ in sorted(places, key=lambda place: -place[1]):
+    heights: list[float] = []
+    for z in (*reading.carrying, *(z for z, _ in sorted(places, key=lambda place: -place[1]))):
         if all(abs(z - other) > APART for other in heights):
             heights.append(z)
     return sorted(heights)

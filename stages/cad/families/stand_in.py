@@ -7,7 +7,7 @@ surface, so that it is as large as the thing. It is a model like those of the li
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,10 +63,10 @@ def of_family(
         return "it hangs, and families stand"
     reading = surface_to_read(target.around, mesh)
     fits = {name: fit(name, reading) for name in tried}
-    found = sorted((f for f in fits.values() if isinstance(f, Fitted)), key=lambda fitted: -fitted.explained)
+    found = [fitted for fitted in fits.values() if isinstance(fitted, Fitted)]
     if not found:
         return "; ".join(f"no {name}: {why}" for name, why in fits.items())
-    best = found[0]
+    best = likeliest(found, node.class_name, said, reading)
     if entry.placements:
         before = explained_by(entry.placements[0], target, reading)
         if not explains_clearly_more(best.near, before, reading.patches):
@@ -87,6 +87,19 @@ def of_family(
     placement = replace(placement, alignment_error=rms(surface, placement, target), score=cost)
     reason = f"a {best.form.family} of {best.form.words}; {best.explained:.0%} explained"
     return replace(entry, node=renamed, placements=(placement, *entry.placements), reason=reason)
+
+
+def likeliest(found: Sequence[Fitted], class_name: str, said: Mapping[str, float], reading: Reading) -> Fitted:
+    """Return the form that explains most of a thing; of those that do not explain clearly less, the one of its class,
+    or else of what masks said most."""
+
+    def trusted(fitted: Fitted) -> tuple[bool, float, float]:
+        names = FAMILIES[fitted.form.family][0]
+        return class_name in names, max(said.get(name, 0.0) for name in names), fitted.explained
+
+    most = max(found, key=lambda fitted: fitted.explained)
+    as_good = [f for f in found if not explains_clearly_more(most.near, f.near, reading.patches)]
+    return max(as_good, key=trusted)
 
 
 def explained_by(placement: Placement, target: Target, reading: Reading) -> np.ndarray:
