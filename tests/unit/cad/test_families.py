@@ -11,7 +11,7 @@ from scenewright.schemas.contact_graph import GraphNode
 from scenewright.stages.cad.carcasses import Patches, patches_of
 from scenewright.stages.cad.families.fitting import Fitted, explains_clearly_more, fit
 from scenewright.stages.cad.families.forms import Form, Piece, Reading, box_piece
-from scenewright.stages.cad.families.stand_in import class_of, write_form
+from scenewright.stages.cad.families.stand_in import class_of, likeliest, write_form
 from scenewright.stages.kit.formats.cad_models import read_model
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
@@ -70,11 +70,15 @@ def shelf(boards=(0.1, 0.5, 0.9, 1.3), x=0.9, y=0.35):
     return [*level, *(((a, -y / 2, 0.0), (a + 0.02, y / 2, 1.3)) for a in (-x / 2, x / 2 - 0.02))]
 
 
-def fitted(family, reading) -> Form:
+def fitted_at_least(share, family, reading) -> Form:
     found = fit(family, reading)
     assert isinstance(found, Fitted), found
-    assert found.explained > 0.95
+    assert found.explained > share
     return found.form
+
+
+def fitted(family, reading) -> Form:
+    return fitted_at_least(0.95, family, reading)
 
 
 def extents(*pieces: Piece) -> np.ndarray:
@@ -176,6 +180,11 @@ def test_a_bed_is_as_wide_both_ways():
         ("chair", table(1.4, 0.8, 0.75), "it has no seat"),
         ("chair", table(0.4, 0.4, 0.45), "it has no back"),
         ("shelf", table(1.4, 0.8, 0.75), "it has 1 boards of one size"),
+        (
+            "shelf",
+            [((-0.5, -0.2, 0.0), (0.5, 0.2, 0.6)), ((-0.25, -0.2, 0.6), (0.25, 0.2, 1.0))],
+            "nothing where its boards would be",
+        ),
         ("sofa", [((-0.9, -0.4, 0.0), (0.9, 0.4, 0.45))], "nothing of it is higher than its seat"),
         ("sofa", [((-0.9, -0.4, 0.0), (0.9, 0.4, 0.9))], "it has no seat"),
     ],
@@ -196,6 +205,28 @@ def test_what_explains_more_explains_it_in_many_places():
     assert not explains_clearly_more(one_place, none, patches), "a single place may be chance"
     either = random.uniform(size=4000) < 0.5
     assert not explains_clearly_more(either, ~either, patches)
+
+
+def test_of_forms_that_explain_as_much_the_one_that_masks_said_is_taken():
+    reading = reading_of(table(1.4, 0.8, 0.75))
+    all_of_it = np.ones(len(reading.patches.areas), bool)
+    little_less = all_of_it & ~(np.arange(len(all_of_it)) % 50 == 0)
+    much_less = reading.patches.points[:, 0] < reading.patches.points[:, 0].mean()
+    forms = {name: SimpleNamespace(family=name) for name in ("shelf", "table")}
+    shelf_fit = Fitted(forms["shelf"], little_less, 0.98)
+    table_fit = Fitted(forms["table"], little_less, 0.97)
+    assert likeliest([shelf_fit, table_fit], "object", {"table": 0.2, "chair": 0.9}, reading) is table_fit
+    assert likeliest([shelf_fit, table_fit], "object", {}, reading) is shelf_fit, "which explains more"
+    assert likeliest([shelf_fit, table_fit], "desk", {"shelf": 0.9}, reading) is table_fit
+    best = Fitted(forms["shelf"], all_of_it, 1.0)
+    assert likeliest([best, Fitted(forms["table"], much_less, 0.5)], "desk", {}, reading) is best
+
+
+def test_what_is_left_over_is_further_pieces_but_not_what_sticks_out():
+    boxes = [*table(1.4, 0.8, 0.75), ((-0.6, 0.3, 0.4), (0.6, 0.32, 0.7)), ((0.7, -0.1, 0.6), (1.2, 0.1, 0.72))]
+    form = fitted_at_least(0.9, "table", reading_of(boxes))
+    (piece,) = named(form, "further piece")
+    assert extents(piece) == pytest.approx([1.2, 0.03, 0.3], abs=0.04), "the board at its rear"
 
 
 def node(class_name: str) -> GraphNode:
