@@ -70,14 +70,15 @@ class JointEvidence(Model):
 
 
 class Inferred(Model):
-    """What nobody saw of a thing that keeps its mesh, and has to be there, or it would not stand."""
+    """What nobody saw of a thing: added to a mesh, which would not stand else, or part of a model of a family."""
 
     what: str
     """Legs, a bottom, depth; empty where nothing has room: then the thing is held."""
     because: str
     """Why."""
     pieces: tuple[tuple[Vector3, ...], ...] = ()
-    """Corners of the convex pieces that are added, world frame [m]. All of their faces are inferred, none was seen."""
+    """Corners of the convex pieces, world frame [m]. All of their faces are inferred, none was seen. To a mesh they are
+    added; a model of a family has them."""
 
 
 class Explained(Model):
@@ -130,7 +131,7 @@ class Replacement(Model):
     stays: str = Field(default="", exclude_if=lambda words: not words)
     """Why it is held where it stands, or free to move, as far as the scene says; `urdf` may know better."""
     inferred: Inferred | None = Field(default=None, exclude_if=lambda inferred: inferred is None)
-    """What is added to the mesh. Absent where it stands as it was seen, and where it need not."""
+    """What is added to the mesh, or what of a model of a family nobody saw. Absent where all was seen, or enough."""
     explained: Explained | None = Field(default=None, exclude_if=lambda explained: explained is None)
     """How much of what was seen of it that explains. Absent for layout, and where nobody asked (older scenes)."""
     joint_evidence: dict[str, JointEvidence] | None = Field(default=None, exclude_if=lambda evidence: evidence is None)

@@ -77,6 +77,7 @@ def scene_file(
                     part_colors=colors[node.id],
                     alternatives=tuple(others),
                     rejected=entry.rejected,
+                    inferred=inferred.get(node.id),
                     explained=explanation.things.get(node.id),
                     joint_evidence=evidence.get(node.id),
                     tries=entry.tries,

@@ -24,6 +24,7 @@ from scenewright.stages.cad.completing import completed, hulls_of
 from scenewright.stages.cad.conflicts import placed_pieces
 from scenewright.stages.cad.explained import shares_of
 from scenewright.stages.cad.explaining import explanation_of
+from scenewright.stages.cad.families.stand_in import inferred_of
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
 from scenewright.stages.cad.made_models import is_built_in, is_of_family
 from scenewright.stages.cad.method import CadMethod
@@ -129,8 +130,19 @@ def choose_and_write(
         explanation = explanation_of(graph, panoptic_map, arranged, shortlists, surfaces, context.output)
         if explanation.rest is not None:
             write_surface(explanation.rest, context.output / UNEXPLAINED)
+        placed = ((name, p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items())
+        unseen = {name: added for name, p, surface in placed if (added := inferred_of(p, surface)) is not None}
         scene = scene_file(
-            graph, final, shortlists, arranged, colors, evidence, inferred, explanation, selection, conflicts_after
+            graph,
+            final,
+            shortlists,
+            arranged,
+            colors,
+            evidence,
+            inferred | unseen,
+            explanation,
+            selection,
+            conflicts_after,
         )
         scene.write(context.output / "scene.json")
         final.write(context.output / "graph.json")

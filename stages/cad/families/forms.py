@@ -19,6 +19,8 @@ what is inferred, none."""
 SEEN_THROUGH, ASIDE, APRON = 0.1, 0.05, 0.1
 """Below a top, this share of the room was seen empty, so far from its edges and from top and ground [m]: what nobody
 saw through may be a box."""
+INFERRED_WORDS = "; inferred: "
+"""Between what was seen of a form and what was not, in words."""
 SPACING, COARSE = 0.02, 0.05
 """Distance of the points at which a piece, and the room below a top, is held against seen space [m]: a voxel of a map
 for what may be thin."""
@@ -64,7 +66,12 @@ class Form:
         seen = [piece.name for piece in self.pieces if piece.seen]
         inferred = [piece.name for piece in self.pieces if not piece.seen]
         listed = ", ".join(_counted(seen))
-        return f"{listed}; inferred: {', '.join(_counted(inferred))}" if inferred else listed
+        return f"{listed}{INFERRED_WORDS}{', '.join(_counted(inferred))}" if inferred else listed
+
+    @property
+    def inferred(self) -> list[int]:
+        """The numbers of the pieces that nobody saw."""
+        return [number for number, piece in enumerate(self.pieces) if not piece.seen]
 
 
 @dataclass(frozen=True)

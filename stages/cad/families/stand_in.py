@@ -14,14 +14,15 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.base import as_vector
 from scenewright.schemas.cad_library import CadModel, ModelState
+from scenewright.schemas.cad_scene import Inferred
 from scenewright.schemas.contact_graph import GraphNode
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.explained import NEAR
 from scenewright.stages.cad.families.fitting import FAMILIES, Fitted, explains_clearly_more, fit, share, surface_to_read
-from scenewright.stages.cad.families.forms import Form, Reading
+from scenewright.stages.cad.families.forms import INFERRED_WORDS, Form, Reading
 from scenewright.stages.cad.made_models import BODY, FAMILY, part_of, plane_of
-from scenewright.stages.cad.model_surfaces import ModelSurface, load_surface, robust_error, to_model
+from scenewright.stages.cad.model_surfaces import ModelSurface, load_surface, robust_error, to_model, to_world
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.shapes import Placement, shape_of_state
 from scenewright.stages.cad.target import Target, stands_in_wall, unsupported_children
@@ -30,6 +31,8 @@ from scenewright.stages.kit.formats.model_writer import write_model_folder
 from scenewright.stages.kit.geometry.solids import Solid, hull_or_box, volume
 from scenewright.stages.kit.geometry.substances import substance_of
 
+INFERRED = "inferred"
+"""Entry of a recipe: which of the pieces nobody saw, by number."""
 WORKED_WITH = frozenset({"monitor", "keyboard", "mouse", "laptop"})
 """What stands on a desk, and tells it from a table."""
 CONTAINS = frozenset({"shelf", "wall_shelf"})
@@ -131,6 +134,19 @@ def class_of(node: GraphNode, form: Form, said: Mapping[str, float], carried: Co
     return {"class_name": name, "node_type": load_vocabulary().by_name(name).node}
 
 
+def inferred_of(placement: Placement, surface: ModelSurface) -> Inferred | None:
+    """Return what nobody saw of a placed model of a family, None where all of it was seen."""
+    numbers = [int(number) for number in str(surface.model.recipe.get(INFERRED, "")).split()]
+    if not numbers:
+        return None
+    pieces = [to_world(placement, np.asarray(surface.pieces[BODY][number].vertices)) for number in numbers]
+    return Inferred(
+        what=str(surface.model.recipe["pieces"]).partition(INFERRED_WORDS)[2],
+        because="their partners were seen, or what they carry was, and nobody saw that nothing is there",
+        pieces=tuple(tuple(as_vector(np.round(corner, 4)) for corner in piece) for piece in pieces),
+    )
+
+
 def write_form(node: GraphNode, form: Form, folder: Path) -> tuple[Placement, ModelSurface]:
     """Write the model of a form and return where it stands, and its surface."""
     corners = np.concatenate([piece.corners for piece in form.pieces])
@@ -155,7 +171,7 @@ def write_form(node: GraphNode, form: Form, folder: Path) -> tuple[Placement, Mo
         movable=load_vocabulary().by_name(node.class_name).movable,
         contains=node.class_name in CONTAINS,
         parts=(BODY,),
-        recipe={FAMILY: form.family, "pieces": form.words},
+        recipe={FAMILY: form.family, "pieces": form.words, INFERRED: " ".join(map(str, form.inferred))},
     )
     write_model_folder(folder, model, [body])
     placement = Placement(shape_of_state(model, state), 1.0, form.turn, form.turn @ origin, 0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from scenewright.schemas.contact_graph import GraphNode
 from scenewright.stages.cad.carcasses import Patches, patches_of
 from scenewright.stages.cad.families.fitting import Fitted, explains_clearly_more, fit
 from scenewright.stages.cad.families.forms import Form, Piece, Reading, box_piece
-from scenewright.stages.cad.families.stand_in import class_of, likeliest, write_form
+from scenewright.stages.cad.families.stand_in import class_of, inferred_of, likeliest, write_form
 from scenewright.stages.kit.formats.cad_models import read_model
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
@@ -111,13 +111,19 @@ def test_a_table_has_its_dimensions_back(size, classes, yaw):
     assert extents(*form.pieces)[2] == pytest.approx(size[2], abs=0.005)
 
 
-def test_a_leg_that_nobody_saw_is_where_its_partner_says_or_nowhere():
+def test_a_leg_that_nobody_saw_is_where_its_partner_says_or_nowhere(tmp_path):
     boxes = table(1.4, 0.8, 0.75)
     room = [((0.5, 0.2, 0.0), (0.7, 0.4, 0.72))]
     form = fitted("table", reading_of(boxes, unseen=(4,), hidden=room))
     seen, inferred = ([leg for leg in named(form, "leg") if leg.seen is is_seen] for is_seen in (True, False))
     assert len(seen) == 3 and len(inferred) == 1 and "inferred: leg" in form.words
     assert extents(*seen, *inferred)[:2] == pytest.approx(extents(*seen)[:2], abs=0.01), "at the fourth corner"
+    placement, surface = write_form(node("table"), form, tmp_path / "thing_3_table")
+    told = inferred_of(placement, surface)
+    assert told.what == "leg" and len(told.pieces) == 1
+    where = inferred[0].corners @ form.turn.T
+    assert np.min(told.pieces[0], axis=0) == pytest.approx(where.min(axis=0), abs=1e-3)
+    assert np.max(told.pieces[0], axis=0) == pytest.approx(where.max(axis=0), abs=1e-3)
     empty = reading_of(boxes, unseen=(4,))
     empty = Reading(empty.patches, 0.0, empty.turn, Known(boxes[:4], empty.free_space.pose), empty.own)
     assert len(named(fitted("table", empty), "leg")) == 3, "not where cameras saw that nothing is"
@@ -253,6 +259,7 @@ def test_the_class_is_what_masks_said_of_what_the_form_may_be(own, said, carried
 def test_a_form_is_a_model_with_levels_mass_and_the_same_bytes(tmp_path):
     form = fitted("table", reading_of(table(1.0, 0.6, 0.7)))
     placement, surface = write_form(node("table"), form, tmp_path / "a" / "thing_3_table")
+    assert inferred_of(placement, surface) is None, "all of it was seen"
     write_form(node("table"), form, tmp_path / "b" / "thing_3_table")
     files = [{p.name: p.read_bytes() for p in sorted((tmp_path / x).rglob("*")) if p.is_file()} for x in "ab"]
     assert files[0] == files[1]
