@@ -127,8 +127,11 @@ def _against(candidate: CadCandidate, chosen: CadCandidate | None) -> str:
 
 
 def _fit(candidate: CadCandidate) -> str:
-    error = length(candidate.alignment_error)
-    return f"It lies {error} (RMS) from what was seen, its matching error is {candidate.matching_error:.2f}."
+    error, matching = length(candidate.alignment_error), candidate.matching_error
+    matched = (
+        f", its matching error is {matching:.2f}" if matching > 0 else ""
+    )  # what is made for a thing is not matched
+    return f"It lies {error} (RMS) from what was seen{matched}."
 
 
 def _tried(tried: Tried) -> Reason:
