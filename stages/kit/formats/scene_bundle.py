@@ -12,7 +12,7 @@ from scenewright.schemas.base import as_transform
 from scenewright.schemas.cad_library import CadModel
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody, Spawn
 from scenewright.schemas.scene_parts import Box
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.mjcf_file import write_mjcf
@@ -85,8 +85,10 @@ class BundleBody:
         return replace(self, movable=False, furniture=False, because=f"held: {why}")
 
 
-def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraphFile) -> InteractiveSceneFile:
-    """Write kind interactive_scene into `root` and return what stands in scene.json.
+def write_scene_bundle(
+    root: Path, bodies: list[BundleBody], graph: ContactGraphFile, spawn: Spawn | None = None
+) -> InteractiveSceneFile:
+    """Write kind interactive_scene into `root` and return what stands in scene.json. `spawn`: a place for a robot.
 
     `scene.urdf`: every body hangs on its parent, on a floating joint when it is movable, else on a fixed one; joints
     inside articulated models are kept. `static.urdf`: what is not movable, fixed to the nearest ancestor that is
@@ -119,8 +121,8 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
     for file in checked:
         require_sound(file, root)
     values = {name: value for body_links in links.values() for name, value in (body_links.joint_values or {}).items()}
-    write_mjcf(root / "scene.mjcf.xml", combined, values)
-    scene = InteractiveSceneFile(bodies=tuple(_record(body, links[body.name]) for body in ordered))
+    write_mjcf(root / "scene.mjcf.xml", combined, values, None if spawn is None else np.array(spawn.world_from_base))
+    scene = InteractiveSceneFile(bodies=tuple(_record(body, links[body.name]) for body in ordered), spawn=spawn)
     scene.write(root / "scene.json")
     graph.write(root / "graph.json")
     return scene
