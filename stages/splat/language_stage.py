@@ -67,7 +67,8 @@ def run(
         for frame in context.progress.track(chosen, total=len(chosen), description="pictures"):
             if frame not in poses:
                 raise BadInput(
-                    f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence"
+                    f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence",
+                    hint="give that sequence",
                 )
             frame_read = reader.read(frame, ("color", "depth"))
             if frame_read.color is None:

@@ -78,7 +78,7 @@ def test_a_torn_video(tmp_path: Path, take: Take) -> None:
     said = refused(log)
     assert "rgb.mp4: is not a video that can be read: it was cut" in said and "its depth alone is read" in said
     (log / "rgb.mp4").unlink()  # the advice
-    assert "is not that of pictures of 1920x1440 pixels (give --fx" in refused(log)
+    assert "is not that of images of 1920x1440 pixels (give --fx" in refused(log)
     for text, options in ((None, {"fx": 42.7, "fy": 42.8, "cx": 32.1, "cy": 23.2}), (OF_ARKIT, {})):
         if text is not None:
             (log / "camera_matrix.csv").write_text(text)
@@ -158,7 +158,7 @@ def test_pictures_of_a_wide_video_beside_square_depth(tmp_path: Path, take: Take
         ("odometry.csv", "x, x, y, z, qx, qy, qz, qw\n1, 1, 1, 1, 0, 0, 0, 1\n", "names a column twice"),
         ("camera_matrix.csv", "320, 0, 240", "is not a 3x3 camera matrix"),
         ("camera_matrix.csv", "a, 0, 240\n0, 320, 180\n0, 0, 1", "holds a value that is not a number"),
-        ("camera_matrix.csv", "320, 0, 20\n0, 320, 180\n0, 0, 1", "is not that of pictures of 480x360"),
+        ("camera_matrix.csv", "320, 0, 20\n0, 320, 180\n0, 0, 1", "is not that of images of 480x360"),
         ("camera_matrix.csv", "0, 0, 240\n0, 320, 180\n0, 0, 1", "are those of no camera"),
     ],
 )

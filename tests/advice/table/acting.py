@@ -225,7 +225,7 @@ ROWS = [
     ),
     NotTried(
         "stages/plan/tasks.py",
-        "declared with --assume",
+        "--assume declares",
         "a planned task of minutes: tests/unit/plan/test_tasks_and_checks.py",
     ),
     Tried(

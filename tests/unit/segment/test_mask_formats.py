@@ -324,7 +324,7 @@ def test_folders_that_say_nothing(tmp_path: Path) -> None:
         (tmp_path / folder).mkdir()
         for k in range(2):
             cv2.imwrite(str(tmp_path / folder / f"{k}.png"), TRUE["cup"].astype(np.uint8))
-    with pytest.raises(BadInput, match="nothing says whether 'a1' or '0' is a picture"):
+    with pytest.raises(BadInput, match="nothing says whether 'a1' or '0' is an image"):
         opened(tmp_path)
 
 
