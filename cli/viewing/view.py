@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import scenewright.cli.viewing
-from scenewright.cli.explaining.explaining import sentences
+from scenewright.cli.explaining import sentences
 from scenewright.cli.viewing.rerun_canvas import RerunCanvas, import_rerun
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput, UsageError

@@ -139,7 +139,7 @@ def test_a_video_that_was_turned_by_a_converter(tmp_path: Path, take: Take) -> N
     log = write_stray_scanner(tmp_path / "log", take)
     upright = [np.ascontiguousarray(np.rot90(picture)) for picture in take.pictures]
     write_video(log / "rgb.mp4", upright, turned=False)
-    assert "pictures of 360x480 do not have the shape of 480x360" in refused(log)
+    assert "images of 360x480 do not have the shape of 480x360" in refused(log)
 
 
 def test_pictures_of_a_wide_video_beside_square_depth(tmp_path: Path, take: Take) -> None:
@@ -281,7 +281,7 @@ def test_pictures_that_were_turned_alone(tmp_path: Path, take: Take) -> None:
     path = write_r3d(tmp_path / "take.r3d", take)
     for index, picture in enumerate(take.pictures):
         with_entry(path, f"rgbd/{index}.jpg", jpeg(np.rot90(picture)))
-    assert "pictures of 360x480 do not have the shape of 480x360, of which the intrinsics are: they were turned" in (
+    assert "images of 360x480 do not have the shape of 480x360, of which the intrinsics are: they were turned" in (
         refused(path)
     )
 

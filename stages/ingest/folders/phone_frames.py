@@ -216,7 +216,7 @@ def _levels_note(count: int, frames: int) -> str:
 
 def _check_shapes(log: PhoneLog) -> None:
     """A phone turns pictures, depth and intrinsics together; whoever converts one of them alone turns it alone."""
-    for what, size in (("pictures", log.picture_size), ("depth", log.depth_size)):
+    for what, size in (("images", log.picture_size), ("depth", log.depth_size)):
         if size is None or same_shape(size, log.full_size):
             continue
         words = f"{log.where}: {what} of {size_words(size)} do not have the shape of {size_words(log.full_size)}"

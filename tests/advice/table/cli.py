@@ -224,7 +224,7 @@ ROWS = [
         "view {room}/sequence --save page.html",
     ),
     Tried(
-        "cli/explaining/explaining.py",
+        "cli/explaining.py",
         "lists its names",
         "explain {fridge}/graph %",
         "explain {fridge}/graph",
