@@ -82,7 +82,7 @@ def check_eyes(
             f"{rows.matches} features lie further right in the right image",
             hint="ingest the log with --color-topic and --right-topic exchanged"
             if sequence.info.source_format in OF_TOPICS
-            else "exchange the left and the right images, and ingest the log again",
+            else "exchange the left and right images, and ingest the log again",
         )
     if rows.checked and abs(rows.median_disparity) < NO_PARALLAX:
         logger.warning(

@@ -154,7 +154,20 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
     page = (folder / "report" / "report.html").read_text()
     tags = parse(page)
     ids = {attributes.get("id") for tag, attributes in tags.seen if tag == "section"}
-    assert ids == {"outlook", "walk", "frames", "map", "graph", "cad", "scene", "plan", "figures", "cost", "made", "why"}
+    assert ids == {
+        "outlook",
+        "walk",
+        "frames",
+        "map",
+        "graph",
+        "cad",
+        "scene",
+        "plan",
+        "figures",
+        "cost",
+        "made",
+        "why",
+    }
     links = {attributes["href"] for tag, attributes in tags.seen if tag == "a" and attributes["href"].startswith("#")}
     assert links == {f"#{name}" for name in ids}
     for text in (

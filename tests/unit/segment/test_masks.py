@@ -601,7 +601,7 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         beyond: "1 of 3 masks are of frames outside the sequence: 000009 (name 9)",
         bomb: "unpacks to more than",
         pickled: "holds object",
-        colours: "a colour image without a table of its classes",
+        colours: "a colour image without a table of classes",
         text: "holds no masks that are read here",
     }
     for write, message in cases.items():

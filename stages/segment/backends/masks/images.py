@@ -43,7 +43,7 @@ def read_instances(path: Path, shape: tuple[int, int]) -> tuple[np.ndarray, bool
         image = image[..., 0]  # grey, stored as colour
     if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
         raise BadInput(
-            f"{path}: is a colour image without a table of its classes",
+            f"{path}: a colour image without a table of classes",
             hint="put a labelmap.txt beside it (a line `chair:128,0,0` a class) or COCO's panoptic JSON, or write "
             "one channel of instances",
         )

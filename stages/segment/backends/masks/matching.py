@@ -128,8 +128,8 @@ def _placed(
         astray_text = ", ".join(astray[:SHOWN]) + (", ..." if len(astray) > SHOWN else "")
         raise BadInput(
             f"{where}: {len(astray)} of {len(pictures)} masks are of frames outside the sequence: {astray_text}",
-            hint=f"name masks by the frames, 0 to {len(times) - 1}, or their times, {times.min():.6f} to "
-            f"{times.max():.6f} s, or as the log names its images"
+            hint=f"name masks by frames, 0 to {len(times) - 1}, by times, {times.min():.6f} to {times.max():.6f} s, or "
+            "like the log's images"
             if len(times)
             else "the sequence is empty",
         )
