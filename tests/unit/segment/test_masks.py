@@ -482,7 +482,7 @@ def test_the_text_is_that_of_pycocotools() -> None:
     ("encoding", "message"),
     [
         ({"size": [4, 5], "counts": [5, 20]}, "adds up to 25 pixels"),
-        ({"size": [4, 5], "counts": [5, 10**9]}, "adds up to more than the picture"),
+        ({"size": [4, 5], "counts": [5, 10**9]}, "adds up to more than the image"),
         ({"size": [4, 5], "counts": [25, -5]}, "a run of -5"),
         ({"size": [4, 5], "counts": [5, 2]}, "adds up to 7"),
         ({"size": [4, 5], "counts": []}, "adds up to 0"),
