@@ -111,7 +111,7 @@ def _with_pictures_inside(
         if "uri" not in image:
             continue
         try:
-            data = _named(folder, path, str(image.pop("uri")), "picture")
+            data = _named(folder, path, str(image.pop("uri")), "image")
         except BadInput as error:
             _drop_pictures(tree)
             return binary, [f"{error.message.removeprefix(f'{path.parent}/')}: colours are those of the materials"]

@@ -98,7 +98,7 @@ def _log(recording: Recording, metadata: Metadata, parameters: IngestParameters)
             *_missing_note(len(numbers), len(metadata.poses)),
         ),
         streams=(
-            *((StreamInfo("pictures", "color", "files", count=len(colors)),) if colors else ()),
+            *((StreamInfo("images", "color", "files", count=len(colors)),) if colors else ()),
             *((StreamInfo("depth", "depth", "files", count=len(packed or exported)),) if packed or exported else ()),
             *((StreamInfo("confidence", "other", "files", count=len(levels)),) if levels else ()),
             StreamInfo("poses", "pose", "metadata", count=len(metadata.poses)),
