@@ -457,7 +457,7 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
     elif "depth" not in streams:
         add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")
     if "color" not in streams:
-        add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes")
+        add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes", "record colour too")
     if "pose" not in streams:
         advice = "run reconstruct-without-poses, which estimates them, or give ingest or fuse your own --trajectory"
         add("doubtful", "poses", f"the frames have no poses, which fuse needs{why('pose')}", advice)

@@ -138,7 +138,9 @@ def stream_findings(streams: Iterable[StreamReport], notes: Iterable[str] = ()) 
         if is_of_images and rate > FASTEST:
             if not told:
                 message = f"{stream.name}: stamps make {rate:,.0f} images a second, {NO_RATE}"
-                findings.append(Finding(severity="doubtful", check="streams", message=message))
+                findings.append(
+                    Finding(severity="doubtful", check="streams", message=message, fix="correct the stamps")
+                )
         elif stream.gaps.count and (
             stream.gaps.longest > LONG_GAP or stream.gaps.count > MANY_GAPS * max(stream.count - 1, 1) + 1
         ):
@@ -148,6 +150,7 @@ def stream_findings(streams: Iterable[StreamReport], notes: Iterable[str] = ()) 
                     check="streams",
                     message=f"{stream.name}: {stream.gaps.count} gaps, the longest {stream.gaps.longest:.3g} s at "
                     f"{stream.gaps.longest_at:.3f} s",
+                    fix="record fewer topics at a time, or to a faster disk",
                 )
             )
         if stream.duplicates:
