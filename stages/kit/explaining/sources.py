@@ -66,7 +66,7 @@ def sentences(sources: Sequence[Source]) -> dict[str, list[str]]:
 def entity_names(sources: Sequence[Source]) -> list[str]:
     """Return the names of what is mapped: nodes of graphs and scenes, then entities that became none."""
     nodes = {node.id: node.instance for source in sources for node in _nodes(source.artifact)}
-    entities = {}
+    entities: dict[int, str] = {}
     for source in sources:
         if isinstance(source.artifact, PanopticMap):
             entities |= _entities(source.artifact)

@@ -224,11 +224,7 @@ ROWS = [
         "view {room}/sequence --save page.html",
     ),
     Tried(
-        "cli/explaining.py",
-        "lists its names",
-        "explain {fridge}/graph %",
-        "explain {fridge}/graph",
-        shows="fridge_",
+        "cli/explaining.py", "lists its names", "explain {fridge}/graph %", "explain {fridge}/graph", shows="fridge_"
     ),
     Tried(
         "cli/viewing/rerun_canvas.py",
