@@ -164,6 +164,6 @@ def _movable_classes(parameters: UrdfParameters) -> frozenset[str]:
     names = {entry.name for entry in vocabulary.classes}
     for name in (*parameters.movable_classes, *parameters.fixed_classes):
         if name not in names:
-            raise UsageError(f"class {name!r} is not in the vocabulary")
+            raise UsageError(f"class {name!r} is not in the vocabulary", hint="name a class of data/vocabulary.toml")
     movable = {entry.name for entry in vocabulary.classes if entry.movable} | set(parameters.movable_classes)
     return frozenset(movable - set(parameters.fixed_classes))

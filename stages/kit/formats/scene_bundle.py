@@ -134,16 +134,18 @@ def _check_bodies(bodies: list[BundleBody]) -> list[BundleBody]:
         if not NAME.fullmatch(body.name) or body.name == WORLD or body.name.startswith((".", "-")):
             raise BadInput(f"body name {body.name!r} is not usable in URDF", hint="use ASCII letters, digits and _")
         if body.name in names:
-            raise BadInput(f"two bodies are called {body.name!r}")
+            raise BadInput(f"two bodies are called {body.name!r}", hint="rename one of them")
         names.add(body.name)
         if not is_rigid(body.world_from_body):
-            raise BadInput(f"body {body.name}: pose is not a rigid transform")
+            raise BadInput(f"body {body.name}: pose is not a rigid transform", hint="give a rotation and a shift")
         if not (np.isfinite(body.scale) and body.scale > 0):
-            raise BadInput(f"body {body.name}: scale is {body.scale}")
+            raise BadInput(f"body {body.name}: scale is {body.scale}", hint="give a scale over 0")
         if body.mass is not None and not (np.isfinite(body.mass) and body.mass > 0):
-            raise BadInput(f"body {body.name}: mass is {body.mass} kg")
+            raise BadInput(f"body {body.name}: mass is {body.mass} kg", hint="give a mass over 0")
         if (body.model is None) != (body.model_folder is None):
-            raise BadInput(f"body {body.name}: a CAD model needs both its record and its folder")
+            raise BadInput(
+                f"body {body.name}: a CAD model needs both its record and its folder", hint="give both, or neither"
+            )
     return bodies
 
 
@@ -157,9 +159,12 @@ def _parents_first(bodies: list[BundleBody]) -> list[BundleBody]:
         name: str | None = body.name
         while name not in (None, SCENE_NODE) and name not in ordered:
             if name in path:
-                raise BadInput(f"bodies carry each other in a circle: {' -> '.join((*list(path)[-9:], name))}")
+                raise BadInput(
+                    f"bodies carry each other in a circle: {' -> '.join((*list(path)[-9:], name))}",
+                    hint="let the scene carry one of them",
+                )
             if name not in by_name:
-                raise BadInput(f"body {list(path)[-1]}: parent {name!r} does not exist")
+                raise BadInput(f"body {list(path)[-1]}: parent {name!r} does not exist", hint="name one of the bodies")
             path[name] = by_name[name]
             name = by_name[name].parent
         for carried in reversed(path.values()):

@@ -243,7 +243,7 @@ ROWS = [
     ),
     NotTried(
         "stages/plan/tasks.py",
-        "declared with --assume",
+        "--assume declares",
         "a planned task of minutes: tests/unit/plan/test_tasks_and_checks.py",
     ),
     Tried(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from scenewright.cli.explaining.reason import Reason, Reasons, counted, edit_reasons, length, listed, merged
 from scenewright.schemas.cad_scene import CadCandidate, CadScene, JointEvidence, Replacement
+from scenewright.stages.kit.explaining.reason import Reason, Reasons, counted, edit_reasons, length, listed, merged
 from scenewright.stages.kit.measurement.cad_candidates import candidates_of
 
 MOST_OTHERS = 3
