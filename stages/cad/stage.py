@@ -67,7 +67,7 @@ def run(
 
     `articulations`: what the log shows in two states, the strongest ground of a joint."""
     if parameters.minimum_scale > parameters.maximum_scale:
-        raise UsageError("minimum_scale is larger than maximum_scale")
+        raise UsageError("minimum_scale is larger than maximum_scale", hint="lower the one or raise the other")
     method = METHODS[parameters.method](parameters)
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):

@@ -91,7 +91,7 @@ def _trajectory(facts: Facts) -> Outlook:
     sound = (f"{posed} of {frames} frames have an estimated pose",)
     doubtful = (HELD_UPRIGHT,) if facts.summary.get("gravity") == "mean_camera_up" else ()
     missing = (f"{frames - posed} frames whose place was not found",) if posed < frames else ()
-    advice = ("move the camera slowly, so that neighbouring pictures share most of what they show",) if missing else ()
+    advice = ("move the camera slowly, so that neighbouring images share most of what they show",) if missing else ()
     return Outlook(sound, doubtful, missing, advice)
 
 
@@ -102,7 +102,7 @@ def _segments(facts: Facts) -> Outlook:
         return Outlook(doubtful=(f"what things are: the masks are {label}",), advice=(advice,))
     if not label or "ground-truth" in label:
         return Outlook()
-    return Outlook(doubtful=(f"names and outlines are those of {label}: look at the pictures first",))
+    return Outlook(doubtful=(f"names and outlines are those of {label}: look at the images first",))
 
 
 def _panoptic_map(facts: Facts) -> Outlook:

@@ -99,7 +99,10 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
     (labels,) = read_arrays(panoptic_map.path("mesh_labels.npz"), "instance", shapes=("V",), hint="make the map again")
     labels = labels.astype(np.int64)
     if len(labels) != len(mesh.vertices):
-        raise BadInput(f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices")
+        raise BadInput(
+            f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices",
+            hint="make the panoptic map again",
+        )
     a, b, c = labels[mesh.faces].T
     instance = np.where((b == c) & (a != b), b, a)
     is_kept = np.linalg.norm(mesh.face_normals, axis=1) > 0.5

@@ -50,7 +50,10 @@ def _body(
     added = None if replacement is None else replacement.inferred
     if node.model_id is not None:
         if node.world_from_model is None or node.scale is None:
-            raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale")
+            raise BadInput(
+                f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale",
+                hint="run `cad` again",
+            )
         folder = cad_scene.path("models") / node.model_id
         if not folder.is_dir():
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
@@ -180,5 +183,7 @@ def _box(node: GraphNode, mesh: trimesh.Trimesh | None, cad_scene: CadScene) -> 
     if node.box is not None:
         return node.box
     if mesh is None:
-        raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has neither box nor mesh")
+        raise BadInput(
+            f"{cad_scene.path('graph.json')}: node {node.id} has neither box nor mesh", hint="run `cad` again"
+        )
     return box_from_bounds(mesh.bounds[0], mesh.bounds[1])

@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from scenewright.cli.explaining.cad_reasons import joint_reason, replacement_reasons
-from scenewright.cli.explaining.explaining import explain, sentences
-from scenewright.cli.explaining.graph_reasons import node_reasons
-from scenewright.cli.explaining.map_reasons import entity_reasons, plane_reasons
-from scenewright.cli.explaining.plan_reasons import link_reasons
-from scenewright.cli.explaining.reason import Reason, edit_reasons
-from scenewright.cli.explaining.scene_reasons import body_reasons, settled_reason
+from scenewright.cli.explaining import explain, sentences
 from scenewright.cli.main import run
 from scenewright.cli.viewing.view import view_artifact
 from scenewright.schemas.base import as_transform
@@ -37,6 +31,12 @@ from scenewright.schemas.panoptic_map import (
 from scenewright.schemas.plan import PlanFile, PlannedAction, TriedPlan
 from scenewright.schemas.scene_parts import Box, Joint, Relation
 from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.kit.explaining.cad_reasons import joint_reason, replacement_reasons
+from scenewright.stages.kit.explaining.graph_reasons import node_reasons
+from scenewright.stages.kit.explaining.map_reasons import entity_reasons, plane_reasons
+from scenewright.stages.kit.explaining.plan_reasons import link_reasons
+from scenewright.stages.kit.explaining.reason import Reason, edit_reasons
+from scenewright.stages.kit.explaining.scene_reasons import body_reasons, settled_reason
 from scenewright.stages.kit.tasks.pddl import parse_domain, parse_problem
 
 from tests.unit.viewing.artifacts import seal

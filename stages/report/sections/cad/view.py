@@ -39,7 +39,7 @@ def view(page: Page) -> dict[str, Any] | None:
     return {
         "cad_views": pictures,
         "replacements": [_replacement_row(r) for r in scene.replacements if r.decision != "layout"],
-        "cad_text": f"CAD models: {decisions.count('cad')}; objects that keep their mesh: {decisions.count('mesh')}; "
+        "cad_text": f"CAD models: {decisions.count('cad')}; things that keep their mesh: {decisions.count('mesh')}; "
         f"layout: {decisions.count('layout')}. The global check went from {scene.conflicts_before} to "
         f"{scene.conflicts_after} colliding pairs in {scene.iterations} iterations.{_explained_text(scene)}",
         **_candidates(page, cad_scene, seen_from),

@@ -5,8 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from scenewright.cli.explaining.reason import Reason, Reasons, counted, edit_reasons, length, listed, merged, percent
 from scenewright.schemas.cad_scene import CadCandidate, CadScene, Explained, JointEvidence, Replacement, Tried
+from scenewright.stages.kit.explaining.reason import (
+    Reason,
+    Reasons,
+    counted,
+    edit_reasons,
+    length,
+    listed,
+    merged,
+    percent,
+)
 from scenewright.stages.kit.measurement.cad_candidates import candidates_of
 
 MOST_OTHERS = 3
