@@ -44,7 +44,7 @@ def batch(
     from scenewright.stages.engine.batch.slurm_executor import parse_task
 
     if retry not in RETRY:
-        raise UsageError(f"--retry {retry!r}: not one of {', '.join(RETRY)}")
+        raise UsageError(f"--retry {retry!r}: there is no such choice", hint=f"choose one of {', '.join(RETRY)}")
     silent = quiet or json_output
     say = (lambda text: None) if silent else _say
     batch_to_run = read_batch(spec)

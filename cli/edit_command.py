@@ -104,7 +104,9 @@ def make_command(form: Form) -> Callable[..., int]:
     def command(**given: Any) -> int:
         named = [kind for kind in sources.values() if given[f"{kind.kind}_"] is not None]
         if sources and len(named) != 1:
-            raise UsageError(f"edit {what}: give either {' or '.join(sources)}")
+            raise UsageError(
+                f"edit {what}: nothing, or too much, says where it is", hint=f"give {' or '.join(sources)}"
+            )
         asked = {field["name"]: _said(field, given) for field in fields}
         values = {"what": what, **asked}
         if named:
@@ -136,7 +138,7 @@ def _subject(kind: type[Artifact], path: Path) -> Subject[Any]:
 def _shifted(subject: Subject[Any], given: Mapping[str, Any]) -> list[float]:
     """Return where the middle of a thing's box goes when it is shifted. Raises UsageError when that is said too."""
     if given["to_"] is not None:
-        raise UsageError("edit move: give --to or --shift, not both")
+        raise UsageError("edit move: --to and --shift both say where", hint="give one of them")
     middle = subject.anchor_of(subject.thing(given["of_"])).box.center
     return [start + way for start, way in zip(middle, given["shift_"], strict=True)]
 

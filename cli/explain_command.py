@@ -18,7 +18,7 @@ def explain(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
     """Say why a thing, joint, plane or plan step is what it is, from the artifact and what it was made from."""
-    from scenewright.cli.explaining.explaining import explain as explain_artifact
+    from scenewright.cli.explaining import explain as explain_artifact
     from scenewright.stages.engine.reading import open_artifact
 
     explained = explain_artifact(open_artifact(path))

@@ -32,7 +32,9 @@ def view(
     if save is not None and rerun:
         raise UsageError("--save and --rerun are two ways to look", hint="choose one")
     if not serves and (edit is not None or read_only or port):
-        raise UsageError("--edit, --read-only and --port are for a page that is served: without --save and --rerun")
+        raise UsageError(
+            "--edit, --read-only and --port are for a page that is served", hint="leave --save and --rerun out"
+        )
     if not serves:
         from scenewright.cli.viewing.view import view_artifact
 

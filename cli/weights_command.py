@@ -20,7 +20,7 @@ def convert_weights(
     from scenewright.stages.disparity.raft.checkpoint import convert
 
     if out.suffix != ".safetensors":
-        raise UsageError(f"{out}: the file to write must end in .safetensors")
+        raise UsageError(f"{out}: weights are written as .safetensors", hint="end the file so")
     if out.exists():
         raise UsageError(f"{out}: exists", hint="choose another --out")
     if not file.is_file():

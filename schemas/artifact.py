@@ -124,7 +124,9 @@ class Artifact:
         try:
             return {record.role: resolved(self.root / record.path) for record in records}
         except (OSError, ValueError, RuntimeError) as error:
-            raise BadInput(f"{self.root}: an input is named that can be nowhere: {error}") from None
+            raise BadInput(
+                f"{self.root}: an input is named that can be nowhere: {error}", hint="make the artifact again"
+            ) from None
 
     def __repr__(self) -> str:
         facts = ", ".join(f"{name} {value}" for name, value in list(self.summary.items())[:4])

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema
 from scenewright.schemas.errors import BadInput, first_problem
-from scenewright.schemas.outside import LARGEST_DOCUMENT, LARGEST_INTEGER, check_integers, file_content
+from scenewright.schemas.outside import AGAIN, LARGEST_DOCUMENT, LARGEST_INTEGER, check_integers, file_content
 
 
 def canonical_json(value: Any) -> str:
@@ -108,7 +108,7 @@ class Model(BaseModel):
         return bounded(handler(source))
 
     @classmethod
-    def read(cls, path: Path, *, largest: int = LARGEST_DOCUMENT, hint: str = "make the artifact again") -> Self:
+    def read(cls, path: Path, *, largest: int = LARGEST_DOCUMENT, hint: str = AGAIN) -> Self:
         """Read and validate a JSON file of at most `largest` bytes.
 
         Raises BadInput naming the file and the first wrong field; `hint` says what to do about it.
@@ -125,7 +125,7 @@ class Model(BaseModel):
             raise BadInput(f"{path}: {error}", hint=hint) from None
 
     @classmethod
-    def of_outside(cls, where: Path | str, *, hint: str = "", **values: Any) -> Self:
+    def of_outside(cls, where: Path | str, *, hint: str, **values: Any) -> Self:
         """Return the model of values that a file of others states. Raises BadInput, beginning with `where`."""
         try:
             return cls(**values)

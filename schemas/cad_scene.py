@@ -23,6 +23,11 @@ class CadCandidate(Model):
     """Equation 2.7."""
     alignment_error: float
     """Root mean square distance from object vertices to the CAD surface [m]."""
+    score: float | None = Field(default=None, exclude_if=lambda score: score is None)
+    """What the choice minimises [m]: the alignment error, and what it costs that points do not tell. In older scenes
+    absent."""
+    explained: float | None = Field(default=None, exclude_if=lambda share: share is None)
+    """Share of what was seen that it explains where it is; of what was chosen and the next two models."""
     stretched_from: Name | None = Field(default=None, exclude_if=lambda source: source is None)
     """The model of the library that it was stretched from; None, and absent from the file, where it is one itself."""
 
@@ -65,14 +70,43 @@ class JointEvidence(Model):
 
 
 class Inferred(Model):
-    """What nobody saw of a thing that keeps its mesh, and has to be there, or it would not stand."""
+    """What nobody saw of a thing: added to a mesh, which would not stand else, or part of a model of a family."""
 
     what: str
     """Legs, a bottom, depth; empty where nothing has room: then the thing is held."""
     because: str
     """Why."""
     pieces: tuple[tuple[Vector3, ...], ...] = ()
-    """Corners of the convex pieces that are added, world frame [m]. All of their faces are inferred, none was seen."""
+    """Corners of the convex pieces, world frame [m]. All of their faces are inferred, none was seen. To a mesh they are
+    added; a model of a family has them."""
+
+
+class Explained(Model):
+    """How much of the surface that was seen of a thing lies near what stands for it, by area (`explained_within`)."""
+
+    area: float
+    """Of what was seen [m²]."""
+    by_model: float
+    """Share that lies near the chosen model; 0 where it keeps its mesh."""
+    by_mesh: float
+    """Share that lies near its own mesh: 1 but for a mesh that was moved farther; 0 where a model stands for it."""
+
+
+Way = Literal["library", "stretched", "by_shape", "family", "built_in"]
+"""How something is sought that may stand for a thing: a model of the library of its class; one stretched along its own
+axes; one of the class that its shape tells; parts of a family of furniture; boxes made for it."""
+
+
+class Tried(Model):
+    """What came of one way."""
+
+    way: Way
+    because: str
+    """Why it gives this, or nothing; empty where nothing is to be said."""
+    model_id: Name | None = None
+    """What it puts first; None where it gives nothing new."""
+    score: float | None = None
+    """What that costs [m]: what the choice among candidates minimises."""
 
 
 class Replacement(Model):
@@ -92,8 +126,14 @@ class Replacement(Model):
     alternatives: tuple[CadCandidate, ...] = ()
     rejected: dict[str, int] = {}
     """Reason -> number of candidates discarded."""
+    tries: tuple[Tried, ...] = Field(default=(), exclude_if=lambda tries: not tries)
+    """In which ways something was sought, in order; where none gave anything, its own mesh stays."""
+    stays: str = Field(default="", exclude_if=lambda words: not words)
+    """Why it is held where it stands, or free to move, as far as the scene says; `urdf` may know better."""
     inferred: Inferred | None = Field(default=None, exclude_if=lambda inferred: inferred is None)
-    """What is added to the mesh. Absent where it stands as it was seen, and where it need not."""
+    """What is added to the mesh, or what of a model of a family nobody saw. Absent where all was seen, or enough."""
+    explained: Explained | None = Field(default=None, exclude_if=lambda explained: explained is None)
+    """How much of what was seen of it that explains. Absent for layout, and where nobody asked (older scenes)."""
     joint_evidence: dict[str, JointEvidence] | None = Field(default=None, exclude_if=lambda evidence: evidence is None)
     """Joint of the chosen model -> why it is believed. Absent where nobody asked (older scenes, `--method thesis`):
     then all joints are."""
@@ -111,6 +151,8 @@ class Replacement(Model):
 
 SURROUNDINGS = "surroundings"
 """The body that is made of what was mapped and has no name; it is no node of the graph."""
+UNEXPLAINED = "unexplained.ply"
+"""The surface of the map that no model, mesh, layout or surroundings of the scene lies near to."""
 
 
 class CadSceneFile(Model):
@@ -122,13 +164,16 @@ class CadSceneFile(Model):
     conflicts_after: int
     iterations: int
     """Steps of min-conflicts."""
+    explained_within: float | None = Field(default=None, exclude_if=lambda distance: distance is None)
+    """Surface so near is explained [m]: 2 cm and as much as depth spreads about planes of the map."""
 
 
 class CadScene(Artifact):
     """`scene.json`, `graph.json` (cg': the contact graph with model, pose, scale, joints per node, boxes and
     planes of the CAD models), `models/<id>/` (copies of the chosen library models), `meshes/<node>.ply` (nodes
     that keep their mesh), `layout/<node>.ply`, `meshes/surroundings.ply` (what the map shows and
-    has no name; absent when there is nothing), `edits.json` (what became of each edit, where people put it right)."""
+    has no name; absent when there is nothing), `unexplained.ply` (what the map shows and nothing in the scene lies
+    near to; absent when there is nothing), `edits.json` (what became of each edit, where people put it right)."""
 
     kind: ClassVar[str] = "cad_scene"
     description: ClassVar[str] = "CAD replacement: model, pose, scale, errors and alternatives per node"

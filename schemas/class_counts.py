@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 from scenewright.schemas.base import Model
-from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
-from scenewright.schemas.places import data_file
+from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import REINSTALL, data_file
 
 FILE = "class_counts.toml"
 
@@ -28,4 +28,4 @@ class ClassCounts(Model):
 @cache
 def class_counts() -> ClassCounts:
     """Read data/class_counts.toml once."""
-    return ClassCounts.model_validate(file_toml(data_file(FILE), LARGEST_SETTINGS))
+    return ClassCounts.model_validate(file_toml(data_file(FILE), hint=REINSTALL))

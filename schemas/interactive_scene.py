@@ -48,6 +48,15 @@ class SceneBody(Model):
         return self.movable and not self.furniture
 
 
+class Spawn(Model):
+    """A place on the floor for a robot's base."""
+
+    world_from_base: Transform
+    """On the floor, x towards the middle of what stands about."""
+    radius: float
+    """Nothing stands nearer than this [m]."""
+
+
 class InteractiveSceneFile(Model):
     """scene.json: how to load the scene. Physics engines that know no floating joints load `static_file` with a
     fixed base and then each movable body at world_from_body."""
@@ -55,6 +64,8 @@ class InteractiveSceneFile(Model):
     combined_file: RelativePath = "scene.urdf"
     static_file: RelativePath = "static.urdf"
     bodies: tuple[SceneBody, ...]
+    spawn: Spawn | None = Field(default=None, exclude_if=lambda place: place is None)
+    """Where a robot has most room on the floor that was seen. Absent where there is none."""
 
 
 class SettledBody(Model):

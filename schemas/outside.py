@@ -20,6 +20,8 @@ from typing import Any
 
 from scenewright.schemas.errors import BadInput, MachineFailure, ScenewrightError
 
+AGAIN = "make the artifact again"
+"""What to do about a file of an artifact; of other files, `hint` says it."""
 LARGEST_DOCUMENT = 256 * 2**20
 """Bytes of a JSON document of an artifact, where nothing else is said."""
 LARGEST_SHOWN = 64 * 2**20
@@ -50,13 +52,13 @@ def _translate_errors(path: Path | str, error: type[ScenewrightError], hint: str
         raise error(f"{path}: file is missing", hint=hint) from None
     except OSError as failed:
         if failed.errno in _MACHINE:
-            raise MachineFailure(f"{path}: {failed.strerror}", hint="the file may be sound") from None
+            raise MachineFailure(f"{path}: {failed.strerror}", hint="try again: the file may be sound") from None
         raise error(f"{path}: {failed.strerror or failed}", hint=hint) from None
     except ValueError as failed:  # a zero byte, or half a character, in its name
         raise error(f"{path}: {failed}", hint=hint) from None
 
 
-def opened(path: Path | str, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> io.BufferedReader:
+def opened(path: Path | str, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN) -> io.BufferedReader:
     """Open a regular file for reading, the caller closes it. Raises `error` for anything else, and never waits.
 
     Raises MachineFailure when the machine is at fault.
@@ -78,7 +80,9 @@ def _check_regular(mode: int, path: Path | str, error: type[ScenewrightError], h
         raise error(f"{path}: {kind}, not a regular file", hint=hint)
 
 
-def file_content(path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> bytes:
+def file_content(
+    path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN
+) -> bytes:
     """Return the bytes of a regular file of at most `largest` bytes. Raises `error`, MachineFailure."""
     with opened(path, error=error, hint=hint) as file, _translate_errors(path, error, hint):
         size = os.fstat(file.fileno()).st_size
@@ -92,7 +96,7 @@ def file_content(path: Path | str, largest: int, *, error: type[ScenewrightError
     return data
 
 
-def file_text(path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> str:
+def file_text(path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN) -> str:
     """Return the text of a UTF-8 file of at most `largest` bytes; a byte order mark is dropped. Raises `error`."""
     try:
         return file_content(path, largest, error=error, hint=hint).decode("utf-8-sig")
@@ -100,13 +104,13 @@ def file_text(path: Path | str, largest: int, *, error: type[ScenewrightError] =
         raise error(f"{path}: not a text file (byte {failed.start} is not UTF-8)", hint=hint) from None
 
 
-def file_json(path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> Any:
+def file_json(path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN) -> Any:
     """Return the document in a JSON file of at most `largest` bytes. Raises `error`."""
     return json_of(file_content(path, largest, error=error, hint=hint), str(path), error=error, hint=hint)
 
 
 def file_toml(
-    path: Path | str, largest: int = LARGEST_SETTINGS, *, error: type[ScenewrightError] = BadInput, hint: str = ""
+    path: Path | str, largest: int = LARGEST_SETTINGS, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN
 ) -> dict[str, Any]:
     """Return what a TOML file of at most `largest` bytes says. Raises `error`."""
     text = file_text(path, largest, error=error, hint=hint)
@@ -122,7 +126,7 @@ def file_toml(
     return values
 
 
-def json_of(data: bytes | str, where: str, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> Any:
+def json_of(data: bytes | str, where: str, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN) -> Any:
     """Return a JSON document, in which Python reads NaN as a number too.
 
     Raises `error`, beginning with `where`, for none, and beyond the bounds above.
@@ -137,7 +141,7 @@ def json_of(data: bytes | str, where: str, *, error: type[ScenewrightError] = Ba
     return value
 
 
-def check_bounds(value: Any, where: str, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> None:
+def check_bounds(value: Any, where: str, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN) -> None:
     """Raise `error` for what nests deeper than DEEPEST, holds over MOST_VALUES values, or integers over 64 bits."""
     waiting = [(value, 0)]
     count = 0
@@ -154,7 +158,7 @@ def check_bounds(value: Any, where: str, *, error: type[ScenewrightError] = BadI
             waiting += [(part, depth + 1) for part in (item.values() if isinstance(item, dict) else item)]
 
 
-def check_integers(data: bytes, where: str, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> None:
+def check_integers(data: bytes, where: str, *, error: type[ScenewrightError] = BadInput, hint: str = AGAIN) -> None:
     """Raise `error` when a JSON document writes an integer that 64 bits cannot hold; the rest is not looked at."""
     if _LONG_DIGITS.search(data) is None:  # long integers are rare, and looking for digits alone is fast
         return

@@ -10,6 +10,8 @@ from pathlib import Path
 HOME = Path(__file__).resolve().parents[1]
 """What holds `stages/`, `schemas/`, `cli/` and `data/`: a checkout, or the installed package."""
 DATA = HOME / "data"
+REINSTALL = "install scenewright again"
+"""What to do about a file of `data/` that is missing or damaged."""
 
 
 def data_file(name: str) -> Path:

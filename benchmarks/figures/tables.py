@@ -179,7 +179,8 @@ def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pa
     """Return a table with a figure a row: label = ["experiment", "key of ours", "key beside it"...].
 
     Where all rows must stand on one screen each is label = {figures = [as above], simulated = "in few words", rival =
-    "a name in few words, where that of the arm is long"}; what the method may know stands on the linked page alone.
+    "a name in few words, where that of the arm is long, or why no figure stands beside ours"}; what the method may know
+    stands on the linked page alone.
     """
     rows: list[list[str]] = []
     above = ""
@@ -204,7 +205,8 @@ def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pa
         above = name
         date = str(experiment.about["date"])
         told = said.get("simulated", about_it)
-        rows.append([linked + unit, cell(figure, digits, brief), "; ".join(rivals) or "–", cases, told, date])
+        rival = "; ".join(rivals) or said.get("rival", "–")
+        rows.append([linked + unit, cell(figure, digits, brief), rival, cases, told, date])
     what = "simulated" if brief else "what was simulated; what the method may know"
     header = ["figure", "ours", "beside it", "cases", what, "measured"]
     return markdown_table(header, rows, len(header))

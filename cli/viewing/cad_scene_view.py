@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 from scenewright.cli.viewing.inputs import input_artifact
 from scenewright.schemas.cad_library import CadLibrary
-from scenewright.schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene, Replacement
+from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadCandidate, CadScene, Replacement
 from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.drawing.palette import UNEXPLAINED_COLOR
 from scenewright.stages.kit.formats.cad_models import read_model
 from scenewright.stages.kit.formats.painted_models import painted_mesh
 from scenewright.stages.kit.measurement.cad_candidates import candidates_of
-from scenewright.stages.kit.viewing.canvas import Canvas
+from scenewright.stages.kit.viewing.canvas import Canvas, bytes_of
 from scenewright.stages.kit.viewing.graphs import draw_graph
 from scenewright.stages.kit.viewing.meshes import load_mesh
 from scenewright.stages.kit.viewing.scenes import trust_of_models
@@ -22,6 +23,8 @@ CANDIDATES = "candidates"
 """Candidates that were not chosen lie below this path: drawn, but hidden at first, as they stand in the chosen ones."""
 MAP = "map"
 """What the scene was made from: hidden at first, to be compared."""
+REST = "unexplained"
+"""Mapped surface that nothing in the scene lies near to: hidden at first."""
 DRAWN_CANDIDATES = 3
 """Most candidates that are drawn of each object, beside the chosen one."""
 
@@ -58,9 +61,13 @@ def draw_cad_scene_of(
     nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
     if nameless.exists():
         canvas.mesh(SURROUNDINGS, load_mesh(nameless), front_only=True)
+    if cad_scene.path(UNEXPLAINED).exists():
+        rest = load_mesh(cad_scene.path(UNEXPLAINED))
+        color = np.array(bytes_of(UNEXPLAINED_COLOR), np.uint8)
+        canvas.mesh(REST, rest, np.tile(color, (len(rest.vertices), 1)))
     if panoptic_map is not None and panoptic_map.path("mesh.ply").exists():
         canvas.mesh(MAP, load_mesh(panoptic_map.path("mesh.ply")), front_only=True)
-    draw_graph(cad_scene.graph, canvas, CANDIDATES, MAP, trusted=trust_of_models(cad_scene.info))
+    draw_graph(cad_scene.graph, canvas, CANDIDATES, MAP, REST, trusted=trust_of_models(cad_scene.info))
     canvas.document("replacements", "\n".join(rows))
     canvas.document(CANDIDATES, candidate_table(cad_scene))
 

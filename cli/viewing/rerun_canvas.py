@@ -54,7 +54,7 @@ class RerunCanvas:
                 save.parent.mkdir(parents=True, exist_ok=True)
                 self._recording.save(save)
             except (OSError, RuntimeError) as error:
-                raise BadInput(f"{save}: cannot be written: {error}") from None
+                raise BadInput(f"{save}: cannot be written: {error}", hint="choose another place for it") from None
         self._log(WORLD, self._rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
 
     def __enter__(self) -> RerunCanvas:

@@ -43,7 +43,7 @@ def draw_splat(splat: Splat, canvas: Canvas) -> None:
     first = first_seen(gaussians, views)
     colors = np.clip(gaussians.harmonics[:, 0] * LEVEL_0 + 0.5, 0, 1)
     sizes = np.exp(gaussians.log_scales).max(axis=1)
-    canvas.document("splat", f"{splat.built.gaussians} Gaussians, {len(splat.built.views)} pictures")
+    canvas.document("splat", f"{splat.built.gaussians} Gaussians, {len(splat.built.views)} images")
     for number, k in enumerate(learned):
         canvas.time(float(times[k]) - float(times[learned[0]]))
         canvas.transform("camera", poses[k])

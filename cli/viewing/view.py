@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import scenewright.cli.viewing
-from scenewright.cli.explaining.explaining import sentences
+from scenewright.cli.explaining import sentences
 from scenewright.cli.viewing.rerun_canvas import RerunCanvas, import_rerun
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput, UsageError
@@ -47,7 +47,7 @@ def view_artifact(path: Path, save: Path | None = None) -> None:
     Raises BadInput (no artifact, or nothing to draw), UsageError (`save` is neither), MissingDependency.
     """
     if save is not None and save.suffix not in (PAGE, RECORDING):
-        raise UsageError(f"{save}: the file to write must end in {PAGE} or {RECORDING}")
+        raise UsageError(f"{save}: the file's ending says no format", hint=f"end it in {PAGE} or {RECORDING}")
     as_page = save is not None and save.suffix == PAGE
     if not as_page:
         import_rerun()

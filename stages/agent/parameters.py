@@ -67,7 +67,7 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
     acts = parameters.simulation == "physics"
     check_robot_acts(parameters, acts=acts, without="the fast world has no arm", hint="give --simulation physics too")
     if parameters.segmenter and parameters.simulation != "physics":
-        raise UsageError("--segmenter: nothing takes pictures in the fast world", hint="give --simulation physics too")
+        raise UsageError("--segmenter: nothing takes images in the fast world", hint="give --simulation physics too")
     if parameters.segmenter and (parameters.arm == "oracle" or parameters.perception != 1.0):
         raise UsageError(
             "--segmenter errs as it does: --arm oracle and --perception say how a simulated one errs",

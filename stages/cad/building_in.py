@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.articulations import Articulation
+from scenewright.schemas.cad_scene import Tried
 from scenewright.schemas.contact_graph import ContactGraphFile
-from scenewright.stages.cad.built_ins import built_in, is_built_in
+from scenewright.stages.cad.built_ins import built_in
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.choosing import may_touch
 from scenewright.stages.cad.conflicts import placed_solid
+from scenewright.stages.cad.made_models import is_built_in
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.placing import placed_box
@@ -67,7 +69,8 @@ def hovers(placement: Placement, surface: ModelSurface, around: Surroundings) ->
 
 def yielded(entry: Shortlist) -> Shortlist:
     """Return the shortlist of a built-in that stood in something else."""
-    return replace(entry, placements=(), reason="not built in: it would stand in something else")
+    tried = Tried(way="built_in", because="it would stand in something else")
+    return replace(entry, placements=(), reason=f"not built in: {tried.because}", tries=(*entry.tries[:-1], tried))
 
 
 def colliding_built_ins(

@@ -13,25 +13,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from scenewright.schemas.articulations import Articulation
 from scenewright.schemas.base import as_vector
 from scenewright.schemas.cad_library import CadModel, ModelState
 from scenewright.schemas.contact_graph import GraphNode
-from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.schemas.scene_parts import Joint
 from scenewright.stages.cad.built_in_leaves import BuiltInLeaf, leaves_of, shifted
 from scenewright.stages.cad.carcasses import CLOSEST, Cells, Patches, cells_of, own_yaw, patches_of
+from scenewright.stages.cad.made_models import BODY, BUILT_IN, part_of, plane_of, quad, rectangle_area, solid_box
 from scenewright.stages.cad.model_surfaces import ModelSurface, facing_side, load_surface
 from scenewright.stages.cad.shapes import Placement, shape_of_state
 from scenewright.stages.cad.target import Surroundings
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
-from scenewright.stages.kit.formats.model_writer import Faceted, PartGeometry, write_model_folder
+from scenewright.stages.kit.formats.model_writer import write_model_folder
 from scenewright.stages.kit.geometry.boxes import bottom, points_in_box
-from scenewright.stages.kit.geometry.solids import Solid, box, mass_properties
 from scenewright.stages.kit.geometry.substances import substance_of
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
-BUILT_IN = frozenset(
+CLASSES = frozenset(
     {
         *("object", "cabinet", "wall_cabinet", "shelf", "wall_shelf", "wardrobe", "drawer_unit", "chest"),
         *("fridge", "oven", "dishwasher", "washing_machine", "door", "window"),
@@ -61,8 +60,6 @@ FEWEST = 20
 """Patches of surface without which nothing can be said."""
 SPACING = 0.05
 """Distance between the points at which a built-in's surface is held against seen space [m]."""
-BODY, GREY = "body", (150, 150, 150)
-"""Name of the part that does not move, and its colour (sRGB) where none was seen."""
 
 
 @dataclass(frozen=True)
@@ -98,14 +95,9 @@ class BuiltIn:
     box_fit: Fit
 
 
-def is_built_in(model: CadModel) -> bool:
-    """Whether a model was made for one node."""
-    return "built_in" in model.recipe
-
-
 def may_be_built_in(node: GraphNode) -> bool:
     """Whether a node is of a class that is built in, and large enough."""
-    return node.class_name in BUILT_IN and node.box is not None and max(node.box.size) >= LEAST_EDGE
+    return node.class_name in CLASSES and node.box is not None and max(node.box.size) >= LEAST_EDGE
 
 
 def built_in(
@@ -197,13 +189,8 @@ def spread(rectangles: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndar
             axes.append(low[a] + (np.arange(count) + 0.5) * (high[a] - low[a]) / count)
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         points.append(grid)
-        areas.append(np.full(len(grid), _area(low, high) / len(grid)))
+        areas.append(np.full(len(grid), rectangle_area(low, high) / len(grid)))
     return np.concatenate(points), np.concatenate(areas)
-
-
-def _area(low: np.ndarray, high: np.ndarray) -> float:
-    edges = high - low
-    return float(np.prod(edges[edges > 0]))
 
 
 def _bounds(patches: Patches) -> tuple[np.ndarray, np.ndarray]:
@@ -243,11 +230,11 @@ def _write_built_in(
         for up in (False, True)
         for a, b in cells.sides(axis, up)
     ]
-    geometries = [_part(BODY, body, density, [_quad(*side) for side in sides])]
+    geometries = [part_of(BODY, body, density, [quad(*side) for side in sides])]
     joints = []
     for k, leaf in enumerate(leaves, 1):
         name = f"leaf_{k}"
-        geometries.append(_part(name, [solid_box(a - leaf.origin, b - leaf.origin) for a, b in leaf.boxes], density))
+        geometries.append(part_of(name, [solid_box(a - leaf.origin, b - leaf.origin) for a, b in leaf.boxes], density))
         joints.append(
             Joint(
                 name=name,
@@ -264,7 +251,7 @@ def _write_built_in(
         joints={joint.name: 0.0 for joint in joints},
         box_minimum=as_vector(low - origin),
         box_maximum=as_vector(high - origin),
-        planes=tuple(_plane(*side) for side in sides),
+        planes=tuple(plane_of(*side) for side in sides),
     )
     model = CadModel(
         id=f"{node.id}_built_in",
@@ -276,7 +263,7 @@ def _write_built_in(
         movable=False,
         contains=bool(joints),
         parts=tuple(part.name for part in geometries),
-        recipe={"built_in": node.id},
+        recipe={BUILT_IN: node.id},
     )
     write_model_folder(folder, model, geometries)
     values = {joint.name: leaf.value for joint, leaf in zip(joints, leaves, strict=True)}
@@ -293,39 +280,3 @@ def _handle(leaf: BuiltInLeaf) -> np.ndarray:
     arm = middle - leaf.origin
     arm = arm - (arm @ leaf.axis) * leaf.axis
     return np.clip(middle + 0.8 * arm, low, high)
-
-
-def solid_box(low: np.ndarray, high: np.ndarray) -> Solid:
-    """Return the box between two corners (3,) [m]."""
-    return box((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
-
-
-def _part(name: str, solids: Sequence[Solid], density: float, shown: Sequence[Faceted] = ()) -> PartGeometry:
-    properties = mass_properties(solids, [density] * len(solids))
-    return PartGeometry(name, solids, [GREY] * len(solids), properties, shown, [GREY] * len(shown))
-
-
-def _corners(axis: int, up: bool, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return the corners (4, 3) of a rectangle across an axis, counter-clockwise as seen from where it looks."""
-    first, second = [a for a in range(3) if a != axis]
-    corners = np.tile(low, (4, 1))
-    corners[[1, 2], first] = high[first]
-    corners[[2, 3], second] = high[second]
-    return corners if up == (axis != 1) else corners[::-1]
-
-
-def _quad(axis: int, up: bool, low: np.ndarray, high: np.ndarray) -> trimesh.Trimesh:
-    return trimesh.Trimesh(_corners(axis, up, low, high), [[0, 1, 2], [0, 2, 3]], process=False)
-
-
-def _plane(axis: int, up: bool, low: np.ndarray, high: np.ndarray) -> SurfacePlane:
-    normal = np.eye(3)[axis] * (1.0 if up else -1.0)
-    middle = 0.5 * (low + high)
-    return SurfacePlane(
-        normal=as_vector(normal),
-        offset=-float(normal @ middle),
-        area=_area(low, high),
-        center=as_vector(middle),
-        corners=tuple(as_vector(corner) for corner in _corners(axis, up, low, high)),
-        horizontal=axis == 2 and up,
-    )

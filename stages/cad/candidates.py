@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.cad_scene import Tried
 from scenewright.schemas.contact_graph import GraphNode
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.method import CadMethod
@@ -32,6 +33,8 @@ class Shortlist:
     rejected: dict[str, int]
     reason: str
     """Why there is no valid candidate, or in what the valid ones fall short."""
+    tries: tuple[Tried, ...] = ()
+    """In which ways something was sought, in order, and what came of it."""
 
 
 def models_for(class_name: str, models: tuple[CadModel, ...]) -> list[CadModel]:

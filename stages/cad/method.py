@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from scenewright.schemas.cad_scene import Way
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.stages.cad.alignment import AlignmentWeights
 from scenewright.stages.cad.arranging import Placer
@@ -40,13 +41,8 @@ class CadMethod(Protocol):
         ...
 
     @property
-    def builds_in(self) -> bool:
-        """Whether a thing that no model fits may become a run of boxes that is made for it."""
-        ...
-
-    @property
-    def stretches(self) -> bool:
-        """Whether a model may be made longer along one axis than along another."""
+    def ways(self) -> tuple[Way, ...]:
+        """The ways in which something is sought that may stand for a thing, in order (`tries.SEEKERS`)."""
         ...
 
     @property
@@ -60,11 +56,6 @@ class CadMethod(Protocol):
 
     def propose(self, target: Target) -> Proposals:
         """Return placed models (sections 2.4.2 and 2.4.3): matched, aligned, measured and scored."""
-        ...
-
-    @property
-    def recognises(self) -> bool:
-        """Whether shape may name what masks did not, or wrongly."""
         ...
 
     def misfit(self, target: Target) -> float:

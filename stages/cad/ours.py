@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.schemas.cad_scene import Way
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.stages.cad.alignment import align, unaligned
 from scenewright.stages.cad.apart import Apart
@@ -57,14 +58,16 @@ class Ours:
         return self.parameters.surroundings
 
     @property
-    def builds_in(self) -> bool:
+    def ways(self) -> tuple[Way, ...]:
         """As the options say."""
-        return self.parameters.built_ins
-
-    @property
-    def stretches(self) -> bool:
-        """As the options say."""
-        return self.parameters.stretched
+        asked: dict[Way, bool] = {
+            "library": True,
+            "stretched": self.parameters.stretched,
+            "by_shape": self.parameters.recognition_error > 0,
+            "family": self.parameters.families,
+            "built_in": self.parameters.built_ins,
+        }
+        return tuple(way for way, is_asked in asked.items() if is_asked)
 
     @property
     def asks_grounds(self) -> bool:
@@ -84,11 +87,6 @@ class Ours:
         rejected = Counter({**counts, "screening rank": len(matches) - len(screened)})
         aligned = self._refine(target, self._align(target, screened, rejected))
         return Proposals([self._measure(target, match, placement) for match, placement in aligned], rejected)
-
-    @property
-    def recognises(self) -> bool:
-        """As the options say."""
-        return self.parameters.recognition_error > 0
 
     def misfit(self, target: Target) -> float:
         """By the score that matches are screened with."""

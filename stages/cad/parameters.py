@@ -45,7 +45,7 @@ class CadParameters(Parameters):
     containment_weight: float = Field(0.5, ge=0.0, description="Alignment: weight of the footprint outside the box")
     height_weight: float = Field(2.0, ge=0.0, description="Alignment: weight of the height difference")
     evaluations: int = Field(1000, ge=1, description="Alignment: most evaluations of the residuals")
-    vertices: int = Field(1500, ge=10, description="Object vertices drawn for the alignment error")
+    vertices: int = Field(1500, ge=10, description="Vertices of a thing drawn for the alignment error")
     misfit_weight: float = Field(
         0.05, ge=0.0, description="ours: weight of the difference in extent from the observed box"
     )
@@ -73,7 +73,7 @@ class CadParameters(Parameters):
         0.12, gt=0.0, description="Largest height difference of a child's old and new supporting surface [m]"
     )
     wall_penetration: float = Field(0.15, ge=0.0, description="Maximum penetration of a wall [m]")
-    collision_tolerance: float = Field(0.015, ge=0.0, description="Penetration from which two objects collide [m]")
+    collision_tolerance: float = Field(0.015, ge=0.0, description="Penetration from which two things collide [m]")
     conflict_iterations: int = Field(50, ge=0, description="Most steps of min-conflicts")
     maximum_shift: float = Field(
         0.08, ge=0.0, description="ours: maximum shift that resolves a collision, 0 for none [m]"
@@ -87,17 +87,20 @@ class CadParameters(Parameters):
     recognition_error: float = Field(
         0.028,
         ge=0.0,
-        description="ours: maximum error at which an object takes the class of a model of another class; 0 "
-        "for never [m]",
+        description="ours: maximum error at which a thing takes the class of a model of another class; 0 for never [m]",
     )
     recognition_margin: float = Field(
         0.01, ge=0.0, description="ours: least margin of that error to all other classes [m]"
     )
     built_ins: bool = Field(
-        True, description="ours: replace an object without model by boxes fitted to it, where these explain its surface"
+        True, description="ours: replace a thing without model by boxes fitted to it, where these explain its surface"
+    )
+    families: bool = Field(
+        True,
+        description="ours: build a table, chair or shelf of parts fitted to its surface where no model explains it",
     )
     stretched: bool = Field(
-        True, description="ours: stretch a model along its own axes where none has the size of the object"
+        True, description="ours: stretch a model along its own axes where none has the size of the thing"
     )
     surroundings: bool = Field(True, description="ours: keep unlabelled surface of the map as a static body")
     surroundings_clearance: float = Field(
@@ -110,7 +113,7 @@ class CadParameters(Parameters):
 
 STAGE = Stage(
     name="cad",
-    summary="Replace objects by CAD models that fit, stand on their supports and do not collide",
+    summary="Replace things by CAD models that fit, stand on their supports and do not collide",
     parameters=CadParameters,
     reads={
         "contact_graph": ContactGraph,

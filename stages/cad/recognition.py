@@ -17,6 +17,7 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.cad.candidates import Shortlist, shortlist
 from scenewright.stages.cad.method import CadMethod
+from scenewright.stages.cad.stretching import source_of
 from scenewright.stages.cad.target import Target
 
 TRIED, LARGEST_MISFIT = 2, 0.035
@@ -28,8 +29,9 @@ third may be hidden, or added to by an open door."""
 
 
 def is_doubtful(own: Shortlist, method: CadMethod) -> bool:
-    """Whether no model of the class that masks gave a thing fits it."""
-    return not own.placements or own.placements[0].score > method.parameters.recognition_error
+    """Whether no model of the class that masks gave a thing fits it as it is, not stretched."""
+    whole = [placement.score for placement in own.placements if source_of(placement.shape.model) is None]
+    return not whole or whole[0] > method.parameters.recognition_error
 
 
 def recognised(own: Shortlist, target: Target, models: Iterable[CadModel], method: CadMethod) -> Shortlist:

@@ -7,19 +7,22 @@ from scenewright.schemas.base import as_transform
 from scenewright.schemas.cad_scene import CadCandidate, CadSceneFile, Inferred, JointEvidence, Replacement
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.arranging import Arrangement, shifted_box
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.conflicts import Selection
+from scenewright.stages.cad.explaining import Explanation
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.placing import placed_box, placed_planes
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.stretching import source_of
+from scenewright.stages.kit.formats.mobility import mobility
 from scenewright.stages.kit.geometry.planes import moved_planes
 from scenewright.stages.kit.geometry.transforms import transform_from
 
 
-def candidate_record(placement: Placement) -> CadCandidate:
-    """Return a placement as it is written."""
+def candidate_record(placement: Placement, explained: float | None = None) -> CadCandidate:
+    """Return a placement as it is written; `explained`: the share of what was seen that it explains, where known."""
     return CadCandidate(
         model_id=placement.shape.model.id,
         stretched_from=source_of(placement.shape.model),
@@ -28,29 +31,41 @@ def candidate_record(placement: Placement) -> CadCandidate:
         world_from_model=as_transform(transform_from(placement.rotation, placement.translation)),
         matching_error=placement.matching_error,
         alignment_error=placement.alignment_error,
+        score=placement.score,
+        explained=explained,
     )
 
 
 def scene_file(
     graph: ContactGraphFile,
+    final: ContactGraphFile,
     shortlists: dict[str, Shortlist],
     arranged: Arrangement,
     colors: dict[str, dict[str, tuple[int, int, int]]],
     evidence: dict[str, dict[str, JointEvidence]],
     inferred: dict[str, Inferred],
+    explanation: Explanation,
     selection: Selection,
     conflicts_after: int,
 ) -> CadSceneFile:
-    """Return scene.json: the decision on every node. `colors`: node -> part -> colour in the map; `evidence`: node ->
-    joint -> why it is believed, for the nodes where that was asked; `inferred`: node -> what is added to its mesh."""
+    """Return scene.json: the decision on every node.
+
+    `final`: cg'; `colors`: node -> part -> colour in the map; `evidence`: node -> joint -> why it is believed, for the
+    nodes where that was asked; `inferred`: node -> what is added to its mesh.
+    """
     replacements = []
     for node in graph.nodes:
         if node.node_type == "layout":
             replacements.append(Replacement(node=node.id, decision="layout"))
         elif node.id in arranged.placements:
             entry, placement = shortlists[node.id], arranged.placements[node.id]
-            chosen = candidate_record(placement)
-            others = [candidate_record(p) for p in entry.placements if p.score != placement.score]
+            seen, shares = explanation.things.get(node.id), dict(explanation.next_models.get(node.id, {}))
+            chosen = candidate_record(placement, None if seen is None else seen.by_model)
+            others = [
+                candidate_record(p, shares.pop(p.shape.model.id, None))
+                for p in entry.placements
+                if p.score != placement.score
+            ]
             first = candidate_record(entry.placements[0])
             replacements.append(
                 Replacement(
@@ -62,7 +77,11 @@ def scene_file(
                     part_colors=colors[node.id],
                     alternatives=tuple(others),
                     rejected=entry.rejected,
+                    inferred=inferred.get(node.id),
+                    explained=explanation.things.get(node.id),
                     joint_evidence=evidence.get(node.id),
+                    tries=entry.tries,
+                    stays=stays_why(final, node, None),
                 )
             )
         elif node.id in shortlists:
@@ -71,14 +90,33 @@ def scene_file(
             reason = f"{entry.reason}; moved by {1000 * went:.0f} mm" if went > 5e-4 else entry.reason
             added = inferred.get(node.id)
             replacements.append(
-                Replacement(node=node.id, decision="mesh", reason=reason, rejected=entry.rejected, inferred=added)
+                Replacement(
+                    node=node.id,
+                    decision="mesh",
+                    reason=reason,
+                    rejected=entry.rejected,
+                    tries=entry.tries,
+                    stays=stays_why(final, node, added),
+                    inferred=added,
+                    explained=explanation.things.get(node.id),
+                )
             )
     return CadSceneFile(
         replacements=tuple(replacements),
         conflicts_before=selection.conflicts_before,
         conflicts_after=conflicts_after,
         iterations=selection.steps,
+        explained_within=explanation.within,
     )
+
+
+def stays_why(final: ContactGraphFile, node: GraphNode, inferred: Inferred | None) -> str:
+    """Return why a thing is held, or free, by cg' and by what is added to it."""
+    carriable = {entry.name for entry in load_vocabulary().classes if entry.movable}
+    mobile = mobility(final, final.node(node.id), carriable, ())
+    if mobile.movable and inferred is not None and not inferred.pieces:
+        return f"held: {inferred.because}"
+    return f"{'free' if mobile.movable else 'held'}: {mobile.why}"
 
 
 def cad_graph(graph: ContactGraphFile, arranged: Arrangement, surfaces: dict[str, ModelSurface]) -> ContactGraphFile:

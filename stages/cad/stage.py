@@ -9,34 +9,38 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.articulations import Articulation, Articulations
-from scenewright.schemas.cad_library import CadLibrary, CadModel
-from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene, JointEvidence
+from scenewright.schemas.cad_library import CadLibrary
+from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadScene, JointEvidence
 from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.arranging import Arrangement
-from scenewright.stages.cad.building_in import built_in_instead, colliding_built_ins, yielded
-from scenewright.stages.cad.built_ins import is_built_in, may_be_built_in
-from scenewright.stages.cad.candidates import Shortlist, models_for, object_points, shortlist
+from scenewright.stages.cad.building_in import colliding_built_ins, yielded
+from scenewright.stages.cad.candidates import Shortlist, models_for, object_points
 from scenewright.stages.cad.choosing import adjust, select
 from scenewright.stages.cad.coloring import part_colors
 from scenewright.stages.cad.completing import completed, hulls_of
 from scenewright.stages.cad.conflicts import placed_pieces
+from scenewright.stages.cad.explained import shares_of
+from scenewright.stages.cad.explaining import explanation_of
+from scenewright.stages.cad.families.stand_in import inferred_of
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
+from scenewright.stages.cad.made_models import is_built_in, is_of_family
 from scenewright.stages.cad.method import CadMethod
-from scenewright.stages.cad.model_surfaces import ModelSurface, load_surface
+from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.obstacles import floor_levels, obstacles_of
 from scenewright.stages.cad.ours import Ours
 from scenewright.stages.cad.parameters import CadParameters
-from scenewright.stages.cad.recognition import is_doubtful, might_be, named_by_people, recognised, renamed
+from scenewright.stages.cad.recognition import named_by_people, renamed
 from scenewright.stages.cad.records import cad_graph, scene_file
 from scenewright.stages.cad.shapes import Placement
-from scenewright.stages.cad.stretching import source_of, with_stretched, write_stretched
+from scenewright.stages.cad.stretching import source_of, write_stretched
 from scenewright.stages.cad.surroundings import footing
-from scenewright.stages.cad.surroundings_files import area_of, surroundings_of, write_surface
+from scenewright.stages.cad.surroundings_files import rounded_area, surroundings_of, write_surface
 from scenewright.stages.cad.target import Surroundings, Target
 from scenewright.stages.cad.thesis import Thesis
+from scenewright.stages.cad.tries import Thing, load_surfaces, sought
 from scenewright.stages.kit.formats.cad_models import model_folder
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
 from scenewright.stages.kit.geometry.convex_solids import convex_solid
@@ -63,7 +67,7 @@ def run(
 
     `articulations`: what the log shows in two states, the strongest ground of a joint."""
     if parameters.minimum_scale > parameters.maximum_scale:
-        raise UsageError("minimum_scale is larger than maximum_scale")
+        raise UsageError("minimum_scale is larger than maximum_scale", hint="lower the one or raise the other")
     method = METHODS[parameters.method](parameters)
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):
@@ -123,22 +127,42 @@ def choose_and_write(
             write_surface(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
         evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
-        scene = scene_file(graph, shortlists, arranged, colors, evidence, inferred, selection, conflicts_after)
+        explanation = explanation_of(graph, panoptic_map, arranged, shortlists, surfaces, context.output)
+        if explanation.rest is not None:
+            write_surface(explanation.rest, context.output / UNEXPLAINED)
+        placed = ((name, p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items())
+        unseen = {name: added for name, p, surface in placed if (added := inferred_of(p, surface)) is not None}
+        scene = scene_file(
+            graph,
+            final,
+            shortlists,
+            arranged,
+            colors,
+            evidence,
+            inferred | unseen,
+            explanation,
+            selection,
+            conflicts_after,
+        )
         scene.write(context.output / "scene.json")
         final.write(context.output / "graph.json")
         copy_models(arranged, library, context)
 
+    of_families = sum(is_of_family(placement.shape.model) for placement in arranged.placements.values())
     decisions = [replacement.decision for replacement in scene.replacements]
     errors = [placement.alignment_error for placement in arranged.placements.values()]
     summary = {
-        "cad": decisions.count("cad") - len(built),
+        "cad": decisions.count("cad") - len(built) - of_families,
+        "of_families": of_families,
         "built_in": len(built),
         "mesh": decisions.count("mesh"),
         "layout": decisions.count("layout"),
         "completed": sum(bool(added.pieces) for added in inferred.values()),
         "conflicts_before": scene.conflicts_before,
         "conflicts_after": scene.conflicts_after,
-        "surroundings_m2": 0.0 if nameless is None else round(area_of(nameless), 2),
+        "surroundings_m2": rounded_area(nameless),
+        **shares_of(explanation.things),
+        "unexplained_m2": rounded_area(explanation.rest),
         "joints": sum(len(joint_grounds) for joint_grounds in evidence.values()),
         "joints_moved": sum(
             "moved" in entry.grounds for joint_grounds in evidence.values() for entry in joint_grounds.values()
@@ -162,15 +186,16 @@ def find_candidates(
 ) -> dict[str, Shortlist]:
     """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`. Models of
     built-ins are written into the output. `moved`: what the log shows in two states."""
-    models = library.info.models
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
     free_space, named_by_hand = method.free_space(panoptic_map), named_by_people(panoptic_map)
+    because = panoptic_map.because
+    said = {} if because is None else {entity.instance: entity.said for entity in because.entities}
     shortlists: dict[str, Shortlist] = {}
     for node in context.progress.track(objects, description="objects"):
         if node.mesh is None:
             shortlists[node.id] = Shortlist(node, (), {}, "the map has no mesh of it")
             continue
-        suitable = models_for(node.class_name, models)
+        suitable = models_for(node.class_name, library.info.models)
         load_surfaces(library, suitable, surfaces)
         mesh = load_entity_mesh(panoptic_map.path(node.mesh))
         used = np.unique(mesh.faces)
@@ -186,25 +211,10 @@ def find_candidates(
             context.random(VERTICES, node.instance),
         )
         target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
-        entry = shortlist(target, method)
-        doubtful = is_doubtful(entry, method)
-        if method.stretches:
-            entry = with_stretched(entry, target, method, library)
-        if method.recognises and node.id not in named_by_hand and doubtful:
-            alike = [model for model in models if might_be(model, target)]
-            load_surfaces(library, alike, surfaces)
-            entry = recognised(entry, target, alike, method)
-        if not entry.placements and method.builds_in and may_be_built_in(node):
-            entry = built_in_instead(entry, target, mesh, moved, method.parameters, context.output / "models")
-        shortlists[node.id] = entry
+        words, by_hand = said.get(node.instance, {}), node.id in named_by_hand
+        thing = Thing(target, mesh, library, moved, words, by_hand, context.output / "models")
+        shortlists[node.id] = sought(thing, method)
     return shortlists
-
-
-def load_surfaces(library: CadLibrary, models: Sequence[CadModel], surfaces: dict[str, ModelSurface]) -> None:
-    """Add the surfaces of models to those that are loaded."""
-    for model in models:
-        if model.id not in surfaces:
-            surfaces[model.id] = load_surface(model_folder(library, model.id), model)
 
 
 def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) -> None:
@@ -218,7 +228,7 @@ def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) ->
         source = source_of(model)
         if source is not None:
             write_stretched(model, model_folder(library, source), folder / model_id)
-        elif not is_built_in(model):
+        elif not is_built_in(model) and not is_of_family(model):
             shutil.copytree(model_folder(library, model_id), folder / model_id)
 
 

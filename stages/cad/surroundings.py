@@ -88,12 +88,12 @@ def nameless_surface(
     for _ in range(ROUNDS):
         if len(faces) == 0:
             return None
-        surface = _compact(mesh, faces)
+        surface = compact(mesh, faces)
         inside = _in_boxes_that_collide(surface, scene, tolerance)
         if not inside.any():
             return surface
         faces = faces[~inside]
-    return None if len(faces) == 0 else _compact(mesh, faces)
+    return None if len(faces) == 0 else compact(mesh, faces)
 
 
 def footing(pieces: Sequence[Piece]) -> Piece:
@@ -132,7 +132,7 @@ def _in_boxes_that_collide(surface: EntityMesh, scene: Solid, tolerance: float) 
     return inside
 
 
-def _compact(mesh: EntityMesh, faces: np.ndarray) -> EntityMesh:
+def compact(mesh: EntityMesh, faces: np.ndarray) -> EntityMesh:
     """Return the faces with the vertices that they use."""
     used, number = np.unique(faces, return_inverse=True)
     return EntityMesh(mesh.vertices[used], number.reshape(faces.shape), mesh.colors[used])

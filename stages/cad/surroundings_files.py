@@ -42,9 +42,9 @@ def surroundings_of(
     )
 
 
-def area_of(surface: EntityMesh) -> float:
-    """Return the area [m²] of a mesh."""
-    return float(trimesh.triangles.area(surface.vertices[surface.faces]).sum())
+def rounded_area(surface: EntityMesh | None) -> float:
+    """Return the area [m²] of a mesh, for a summary; 0 without one."""
+    return 0.0 if surface is None else round(float(trimesh.triangles.area(surface.vertices[surface.faces]).sum()), 2)
 
 
 def write_surface(surface: EntityMesh, path: Path) -> None:

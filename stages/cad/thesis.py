@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from scenewright.schemas.cad_scene import Way
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.stages.cad.alignment import align
 from scenewright.stages.cad.arranging import Placer, Standing
@@ -32,14 +33,9 @@ class Thesis:
         return False
 
     @property
-    def builds_in(self) -> bool:
-        """It knows the library's models alone."""
-        return False
-
-    @property
-    def stretches(self) -> bool:
-        """Models have one scale (2.10)."""
-        return False
+    def ways(self) -> tuple[Way, ...]:
+        """It takes the class from the masks, and the library's models at one scale (2.10)."""
+        return ("library",)
 
     @property
     def asks_grounds(self) -> bool:
@@ -72,11 +68,6 @@ class Thesis:
             error = alignment_error(target.surfaces[match.shape.model.id], placement, target.points)
             placements.append(replace(placement, alignment_error=error, score=error))
         return Proposals(placements, rejected)
-
-    @property
-    def recognises(self) -> bool:
-        """The thesis takes the class from the masks."""
-        return False
 
     def misfit(self, target: Target) -> float:
         """No other class promises anything."""

@@ -55,7 +55,7 @@ def stereo_cameras(reader: FrameReader, sequence: Sequence) -> dict[str, float]:
         if baseline < 0:
             raise BadInput(
                 f"{sequence.root}: left and right of {name!r} are swapped: the baseline is {baseline:g} m",
-                hint="ingest the log again, which looks at its pictures",
+                hint="ingest the log again, which looks at its images",
             )
     return baselines
 
@@ -79,14 +79,14 @@ def check_eyes(
     if rows.checked and rows.negative_share > SWAPPED:
         raise BadInput(
             f"{sequence.root}: left and right of {name!r} are swapped: {100 * rows.negative_share:.0f} % of "
-            f"{rows.matches} matched features lie further right in the right picture",
-            hint="ingest the log again with the topics of --color-topic and --right-topic exchanged"
+            f"{rows.matches} features lie further right in the right image",
+            hint="ingest the log with --color-topic and --right-topic exchanged"
             if sequence.info.source_format in OF_TOPICS
-            else "put the pictures of the left eye in the place of those of the right one, and ingest the log again",
+            else "exchange the left and right images, and ingest the log again",
         )
     if rows.checked and abs(rows.median_disparity) < NO_PARALLAX:
         logger.warning(
-            "%s: %d matched features of %r have a median disparity of %.2f px: one picture twice, or nothing near",
+            "%s: %d matched features of %r have a median disparity of %.2f px: one image twice, or nothing near",
             sequence.root,
             rows.matches,
             name,

@@ -32,7 +32,7 @@ CORE = {
     "mcap": ("mcap", "MCAP logs"),
     "rosbags": ("rosbags", "ROS bags"),
     "torch": ("torch", "networks of segment, disparity and suture"),
-    "pycolmap": ("pycolmap", "poses --bundle-adjustment, a splat's points from pictures alone"),
+    "pycolmap": ("pycolmap", "poses --bundle-adjustment, a splat's points from images alone"),
     "trimesh": ("trimesh", "meshes"),
     "open3d": ("open3d", "ray casting at meshes"),
     "python-fcl": ("fcl", "distances between solids"),

@@ -78,7 +78,7 @@ def read_pipeline(path: Path) -> Pipeline:
     try:
         pipeline = Pipeline.model_validate(values)
     except ValidationError as error:
-        raise UsageError(f"{path}: {first_problem(error)}", hint="see docs") from None
+        raise UsageError(f"{path}: {first_problem(error)}", hint="data/pipelines holds examples") from None
     done: dict[str, Stage] = {}
     for step in pipeline.step:
         if not _NAME.match(step.name):
@@ -106,7 +106,8 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
             raise UsageError(f"{where}: {stage.name} has no input {role!r}", hint=f"inputs: {', '.join(stage.reads)}")
         if not _VARIABLE.match(source) and source.split("/")[0] not in done:
             raise UsageError(
-                f"{where}: input {role!r} comes from {source!r}, which is not an earlier step", hint="reorder"
+                f"{where}: input {role!r} comes from {source!r}, which is not an earlier step",
+                hint="put that step before it",
             )
     if step.shared and step.inputs:
         raise UsageError(f"{where}: a shared step has no inputs", hint="leave `shared` out")

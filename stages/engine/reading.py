@@ -79,7 +79,10 @@ def check_sizes(root: Path, manifest: Manifest) -> None:
             inside = real_path.startswith(within)
             size = path.stat().st_size if path.is_file() else None
         except (OSError, ValueError) as error:
-            raise BadInput(f"{root}: {record.path!r:.80}: {getattr(error, 'strerror', None) or error}") from None
+            raise BadInput(
+                f"{root}: {record.path!r:.80}: {getattr(error, 'strerror', None) or error}",
+                hint="make the artifact again",
+            ) from None
         if not inside:
             raise BadInput(f"{root}: {record.path} points outside the artifact", hint="make the artifact again")
         if size is None:

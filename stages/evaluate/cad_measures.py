@@ -193,15 +193,15 @@ def measure_cad(
     part.set("conflicts_after", scene.conflicts_after)
     part.notes.append(
         "CAD errors compare model frames (bottom centre, front along -y). Yaw is also given modulo the symmetry of "
-        "the chosen model's closed shape (colours do not count), and modulo a quarter turn, which leaves every "
-        "confusion of front and side out. Scale and joint errors are taken where the chosen model is the true one."
+        "the chosen model's closed shape, without its colours. Yaw modulo a quarter turn leaves out every confusion of "
+        "front and side. Scale and joint errors are taken where the chosen model is the true one."
     )
     part.tables.append(
         Table(
             "cad_objects",
-            "CAD replacement by object",
+            "CAD replacement by thing",
             (
-                "true object",
+                "true thing",
                 "node",
                 "class",
                 "decision",

@@ -57,7 +57,9 @@ def load_map(panoptic_map: PanopticMap) -> PredictedMap:
     path = panoptic_map.path("mesh_labels.npz")
     instances = read_arrays(path, "instance", shapes=("V",))[0].astype(np.int64)
     if len(instances) != len(surface.vertices):
-        raise BadInput(f"{path}: {len(instances)} labels for {len(surface.vertices)} vertices")
+        raise BadInput(
+            f"{path}: {len(instances)} labels for {len(surface.vertices)} vertices", hint="make the panoptic map again"
+        )
     return PredictedMap(panoptic_map.info, surface, instances)
 
 

@@ -11,8 +11,8 @@ from scenewright.stages.kit.measurement.room_penetrations import Penetration
 from scenewright.stages.kit.measurement.tables import Cell, Table
 
 NOTE = (
-    "Replacement: an object succeeds (Scan2CAD, Avetisyan et al. 2019) when the chosen model is of its class and "
-    "stands within 0.20 m, 20 degrees and 20 % of the true one; missed and unreplaced objects fail, except in the "
+    "Replacement: a thing succeeds (Scan2CAD, Avetisyan et al. 2019) when the chosen model is of its class and "
+    "stands within 0.20 m, 20 degrees and 20 % of the true one; missed and unreplaced things fail, except in the "
     "shares that end in `_detected`. Translation is between the middles of the closed models' boxes, rotation modulo "
     "the symmetry of the true model (models with joints have none), scale the mean ratio of the three extents. "
     "Collisions are pairs more than 5 mm deep, volumes are counted on a grid. The four criteria of functional "
@@ -57,7 +57,7 @@ def alignment_table(stem: str, objects: Sequence[ObjectResult]) -> Table:
             )
         )
     columns = (
-        "true object",
+        "true thing",
         "node",
         "decision",
         "true model",
@@ -94,7 +94,7 @@ def equivalence_table(stem: str, objects: Sequence[ObjectResult]) -> Table:
             )
         )
     columns = (
-        "true object",
+        "true thing",
         "node",
         "class",
         "carried by the same",
@@ -125,7 +125,7 @@ def joint_table(stem: str, objects: Sequence[ObjectResult]) -> Table:
         for joint in r.joints
     ]
     columns = (
-        "true object",
+        "true thing",
         "joint",
         "type",
         "stands for it",

@@ -78,7 +78,10 @@ def load_truth(truth: GroundTruth, world_from_log: np.ndarray, minimum_visible_p
     points, instances = read_arrays(truth.path("visible.npz"), "points", "instance", shapes=("N 3", "N"))
     points, instances = points.astype(float), instances.astype(np.int64)
     if points.shape != (len(instances), 3):
-        raise BadInput(f"{truth.path('visible.npz')}: {points.shape} points for {len(instances)} instances")
+        raise BadInput(
+            f"{truth.path('visible.npz')}: {points.shape} points for {len(instances)} instances",
+            hint="make the ground truth again",
+        )
     counts = {int(k): int(n) for k, n in zip(*np.unique(instances, return_counts=True), strict=True)}
     optional = {o.instance for o in file.objects if counts.get(o.instance, 0) < minimum_visible_points}
     if file.source == "scan":  # an annotator may say that a thing counts neither way, though points of it are known

@@ -48,7 +48,7 @@ def masks_of(sequence: Sequence, segments: Segments | None) -> Iterator[MaskSour
             size = next((c.camera for c in sequence.info.cameras if c.name == frame.camera_name), size)
             if ids.shape != (size.height, size.width):
                 raise BadInput(
-                    f"{segments.root}: masks of frame {frame.index} are {ids.shape[1]} x {ids.shape[0]}, its pictures "
+                    f"{segments.root}: masks of frame {frame.index} are {ids.shape[1]} x {ids.shape[0]}, its images "
                     f"{size.width} x {size.height}",
                     hint="give the sequence that it was made of",
                 )

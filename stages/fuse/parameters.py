@@ -54,9 +54,8 @@ class FuseParameters(Parameters):
 
     merging: Literal["ours", "thesis", "separate"] = Field(
         "ours",
-        description="`thesis`: segment labels of one frame segment merge; `ours`: only those of its class "
-        "that are more often together than apart, and instances seen as one; `separate`: no "
-        "instances merge (Voxblox++)",
+        description="`thesis`: segment labels of one frame segment merge; `ours`: only those of a class, more "
+        "often together than apart, and instances seen as one; `separate`: none (Voxblox++)",
     )
     merge_overlap_share: float = Field(
         0.2, gt=0, le=1, description="Least share of a frame segment that each of two labels fills when they share it"
@@ -116,7 +115,8 @@ def check(parameters: FuseParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError unless the depth range holds something, and for frames beside an annotated scan."""
     if parameters.minimum_depth >= parameters.maximum_depth:
         raise UsageError(
-            f"--minimum-depth {parameters.minimum_depth} is not below --maximum-depth {parameters.maximum_depth}"
+            f"--minimum-depth {parameters.minimum_depth} is not below --maximum-depth {parameters.maximum_depth}",
+            hint="lower the one or raise the other",
         )
     frames = [role for role in ("sequence", "segments", "trajectory", "articulations") if role in inputs]
     if "from_mesh" in inputs and frames:

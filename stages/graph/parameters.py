@@ -60,7 +60,7 @@ class GraphParameters(Parameters):
         1.0, ge=0.0, description="Largest extension of a box down to its supporting plane [m]"
     )
     wall_distance: float = Field(
-        0.12, ge=0.0, description="Largest distance of an unsupported object's mesh from the wall that it hangs on [m]"
+        0.12, ge=0.0, description="Largest distance of an unsupported thing's mesh from the wall that it hangs on [m]"
     )
     wall_classes: tuple[str, ...] = Field(
         ("wall_cabinet", "wall_shelf", "clock", "picture", "monitor", "shelf", "lamp", "pendant_lamp"),

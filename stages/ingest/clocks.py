@@ -30,15 +30,15 @@ def stamps_problem(stamps: Sequence[int], names: Sequence[str] = ()) -> str | No
         return f"all {count} stamps are the same"
     rate = 1e9 / float(np.median(np.diff(distinct)))
     if rate > FASTEST:
-        return f"stamps make {rate:,.0f} pictures a second, {NO_RATE}"
+        return f"stamps make {rate:,.0f} images a second, {NO_RATE}"
     latest = np.maximum.accumulate(times)[:-1]
     behind, repeated = int((times[1:] < latest).sum()), count - len(distinct)
     keys = [natural_key(name) for name in names]
     in_order = bool(keys) and all(first < second for first, second in pairwise(keys))
     if in_order and behind > MOST_WRONG * count:
-        return f"{behind} of {count} stamps lie before an earlier picture's"
+        return f"{behind} of {count} stamps lie before an earlier image's"
     if 2 * repeated >= count or (in_order and repeated > MOST_WRONG * count):
-        return f"{count} pictures have {len(distinct)} stamps"
+        return f"{count} images have {len(distinct)} stamps"
     return None
 
 
@@ -49,5 +49,5 @@ def in_file_order(count: int, frame_rate: float) -> np.ndarray:
 
 def order_note(problem: str, parameters: IngestParameters) -> str:
     """Return what is taken in the place of stamps that are no clock's: a warning, unless the rate was given."""
-    taken = f"{problem}: taken is the order in the file, {parameters.frame_rate:g} pictures a second"
+    taken = f"{problem}: taken is the order in the file, {parameters.frame_rate:g} images a second"
     return taken if "frame_rate" in parameters.model_fields_set else f"WARNING: {taken} (--frame-rate RATE if known)"

@@ -51,7 +51,7 @@ def _verdict(camera: SourceCamera, share: float, count: int, where: str) -> str:
             f"sign of the calibration is taken to be wrong (--baseline {-camera.baseline:.4g} says so)"
         )
     topics = f"--color-topic {right} --right-topic {left}"
-    exchange = topics if left.startswith("/") else f"exchange the pictures of {left} and {right}"
+    exchange = topics if left.startswith("/") else f"exchange the images of {left} and {right}"
     if count >= LEAST_MATCHES and share <= 1 - MOST:
         raise BadInput(
             f"{where}: left and right are swapped: {stated}, and {100 * (1 - share):.0f} % of {count} matched features "
@@ -59,7 +59,7 @@ def _verdict(camera: SourceCamera, share: float, count: int, where: str) -> str:
             hint=exchange,
         )
     raise BadInput(
-        f"{where}: left and right seem to be swapped: {stated}; the pictures do not tell ({count} features match)",
+        f"{where}: left and right seem to be swapped: {stated}; the images do not tell ({count} features match)",
         hint=f"{exchange}; or, if only the sign is wrong, --baseline {-camera.baseline:.4g}",
     )
 

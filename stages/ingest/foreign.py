@@ -40,9 +40,9 @@ VIDEO = Foreign(
 )
 RTABMAP = Foreign(
     "an RTAB-Map database",
-    "rtabmap-export --images --poses_camera --poses_format 10 {} writes NAME_rgb, NAME_depth, NAME_calib and "
-    "NAME_camera_poses.txt: put the first two into a folder as rgb and depth, a file of the third as calibration.yaml, "
-    "and ingest it with --trajectory NAME_camera_poses.txt",
+    "`rtabmap-export --images --poses_camera --poses_format 10 {}` writes NAME_rgb, NAME_depth, NAME_calib and "
+    "NAME_camera_poses.txt: name the first two rgb and depth, a file of the third calibration.yaml, and ingest their "
+    "folder with --trajectory NAME_camera_poses.txt",
 )
 BY_ENDING = {
     ".mkv": VIDEO,
@@ -51,7 +51,7 @@ BY_ENDING = {
         (".svo", ".svo2"),
         Foreign(
             "a ZED recording",
-            "write left pictures and depth with the ZED SDK: python export_svo.py --mode 4 --input_svo_file {} "
+            "write left images and depth with the ZED SDK: python export_svo.py --mode 4 --input_svo_file {} "
             "--output_path_dir OUT, then ingest OUT with its --fx --fy --cx --cy",
         ),
     ),
@@ -71,7 +71,7 @@ BY_ENDING = {
     ".rrd": Foreign("a Rerun recording", "record the same streams as MCAP (docs/LOGS.md)"),
     **dict.fromkeys(
         (".h5", ".hdf5", ".parquet"),
-        Foreign("a table of arrays", "write its pictures as a folder of images (docs/LOGS.md) and give that folder"),
+        Foreign("a table of arrays", "write its images into a folder (docs/LOGS.md) and give that folder"),
     ),
     ".tum": Foreign("a trajectory, no recording", "give its log, and it beside: ingest --log FOLDER --trajectory {}"),
     **dict.fromkeys((".zip", ".tar", ".gz", ".tgz", ".7z", ".rar", ".xz"), Foreign("an archive", UNPACK)),
@@ -115,5 +115,5 @@ def _refuse(path: Path, found: Foreign) -> None:
 
 
 def _head(path: Path) -> bytes:
-    with opened(path) as file:
+    with opened(path, hint="check its permissions") as file:
         return file.read(HEAD)

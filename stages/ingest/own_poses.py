@@ -37,7 +37,7 @@ def with_own_poses(source: LogSource, path: Path, parameters: IngestParameters) 
         covered = coverage_notes(found, times, posed, parameters)
         if not any(posed):
             reason = "; ".join(covered).removeprefix("WARNING: ") or f"{file.name} holds no poses"
-            raise BadInput(f"{file}: {reason}", hint="its stamps must be of the clock of the pictures")
+            raise BadInput(f"{file}: {reason}", hint="its stamps must be of the clock of the images")
         notes = (*notes, *found.notes, *covered)
     else:
         poses = found

@@ -94,7 +94,7 @@ class IngestParameters(Parameters):
 def check(parameters: IngestParameters, inputs: Any) -> None:
     """Refuse combinations that cannot work. Raises UsageError."""
     if parameters.stop is not None and parameters.stop <= parameters.start:
-        raise UsageError(f"stop {parameters.stop} is not after start {parameters.start}")
+        raise UsageError(f"stop {parameters.stop} is not after start {parameters.start}", hint="stop later")
 
 
 REPACKED = 1.2

@@ -349,7 +349,7 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
         )
     if written.brightness and (lit := float(np.median(written.brightness))) < DARK:
         notes.append(
-            f"WARNING: the pictures are all but black ({lit:.0f} of 255): a lens cap, or night; what is mapped has the "
+            f"WARNING: the images are all but black ({lit:.0f} of 255): a lens cap, or night; what is mapped has the "
             "shape that depth gives, and names say nothing"
         )
     poses = np.array(written.poses).reshape(-1, 4, 4)
@@ -362,11 +362,11 @@ def _warnings(source: LogSource, written: _Written) -> list[str]:
     if written.times and "color" not in written.streams:
         notes.append(
             "WARNING: frames have no colour: what is mapped has the shape that depth gives, names are guessed from "
-            "shape alone, and steps that need pictures refuse"
+            "shape alone, and steps that need images refuse"
         )
     if written.orientations:
         notes.append(
-            f"{written.orientations} pictures state an EXIF orientation: the calibration is taken to be of the pixels "
+            f"{written.orientations} images state an EXIF orientation: the calibration is taken to be of the pixels "
             "as they are stored, and the orientation is left out"
         )
     if written.times and "depth" not in written.streams and "depth" not in source.missing:

@@ -150,7 +150,9 @@ def rectifying_rotation(left_from_right: np.ndarray) -> np.ndarray:
 def _pinhole(matrix: np.ndarray, size: tuple[int, int], record: CalibrationRecord, where: str) -> Camera:
     width, height = size if size != (0, 0) else (record.width, record.height)
     fx, fy, cx, cy = (float(matrix[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
-    return Camera.of_outside(where, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+    return Camera.of_outside(
+        where, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, hint="calibrate the pair again"
+    )
 
 
 def _check_baseline(baseline: float, names: tuple[str, str], where: str) -> None:

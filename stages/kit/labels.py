@@ -192,18 +192,18 @@ def class_of_word(word: str) -> str:
     return ANYTHING
 
 
-def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, where: str) -> LabelMap:
+def match_labels(names: Mapping[int, str], *given: LabelSet | None, where: str) -> LabelMap:
     """Return what the numbers of a network stand for, from the names that it gives them.
 
-    Without a `given` set, the one that knows most of the names is taken, of equals the vocabulary; names that it lacks
-    are looked for in the others. Raises
-    BadInput when not one name is known. Placeholders (`N/A`, empty) are passed over.
+    The `given` sets go first, in their order. What they lack is looked for in the tables of data/labels: first in the
+    one that knows most of the names, of equals the vocabulary. Raises BadInput when not one name is known.
+    Placeholders (`N/A`, empty) are passed over.
     """
     real = {number: name for number, name in names.items() if plain(name) not in ("", "n/a", "none", "background")}
-    candidates = [given] if given else [load_label_set(name) for name in MATCHED]
-    best = max(candidates, key=lambda labels: sum(labels.find(name) is not None for name in real.values()))
+    tables = [load_label_set(name) for name in MATCHED]
+    best = max(tables, key=lambda labels: sum(labels.find(name) is not None for name in real.values()))
     # Masks of several networks may lie in one folder.
-    sets = [best, *(labels for labels in candidates if labels is not best)]
+    sets = [*(labels for labels in given if labels), best, *(labels for labels in tables if labels is not best)]
     found = {
         number: next((label for each in sets if (label := each.find(name)) is not None), None)
         for number, name in real.items()
@@ -215,7 +215,7 @@ def match_labels(names: Mapping[int, str], given: LabelSet | None = None, *, whe
         raise BadInput(
             f"{where}: its labels ({examples}, ...) are in no table", hint="give a table of them: --labels FILE.toml"
         )
-    return LabelMap(best.name, matched, unknown)
+    return LabelMap(sets[0].name, matched, unknown)
 
 
 def _text(path: Path) -> str:

@@ -107,7 +107,9 @@ def _best_region(model: WorldModel, belief: Belief, width: float, height: float)
     fitting = [region for region in model.regions(belief.container) if region.takes(width / 2, height)]
     hidden = [region for region in fitting if region.doors] or fitting
     if not hidden:
-        raise UsageError(f"nothing as large as a {belief.class_name} has room in {belief.container}")
+        raise UsageError(
+            f"nothing as large as a {belief.class_name} has room in {belief.container}", hint="assume it elsewhere"
+        )
 
     def discomfort(region: Region) -> float:
         middle = np.array([*(region.low + region.high) / 2, region.level])

@@ -291,7 +291,9 @@ class Conduct:
             return None
         assert step.manipulation is not None
         shift = model.pose(before.body)[:3, 3] - before.pose[:3, 3]
-        return action.moved_along(model, step.arguments, step.manipulation, shift)
+        base, goal = action.moved_along(model, step.arguments, step.manipulation, shift)
+        # An arm that stands still does it from where it stands.
+        return (base if model.description.drives else step.manipulation.base), goal
 
     def _execute(self, step: Step) -> None:
         item = None

@@ -221,7 +221,7 @@ def read_given_domain(path: Path) -> GivenDomain:
     """Read `--domain`: a PDDL file, or the folder of a domain that was learned in rooms. Raises BadInput."""
     if path.is_dir():
         return _read_learned(path)
-    domain = parse_domain(file_text(path, LARGEST_SETTINGS))
+    domain = parse_domain(file_text(path, LARGEST_SETTINGS, hint=HINT))
     for name, kinds in domain.predicates.items():
         scene_kinds = DOMAIN.predicates.get(name)
         if scene_kinds is not None and len(scene_kinds) != len(kinds):

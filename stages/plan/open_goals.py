@@ -89,5 +89,5 @@ def _lacking(text: str, finder: Finder) -> str:
     if not finder.cannot_tell(text):
         return f"the scene has no {text!r}"
     unread = ", ".join(map(repr, finder.encoder.unread(text)))
-    why = f"the encoder has never read {unread}" if unread else "the encoder has learned no pictures like these"
+    why = f"the encoder has never read {unread}" if unread else "the encoder has learned no images like these"
     return f"whether the scene has {text!r} is unknown, for {why}"

@@ -14,9 +14,9 @@ from scenewright.stages.kit.simulation.urdf_split import PART_SEPARATOR
 from scenewright.stages.kit.tasks.strips import Atom, GroundAction, Problem, positive_task
 from scenewright.stages.kit.tasks.task_planner import plan_task
 from scenewright.stages.plan.domain import DOMAIN
-from scenewright.stages.plan.formulas import Alternative, Names, alternatives, literal_text, together
+from scenewright.stages.plan.formulas import HINT, Alternative, Names, alternatives, literal_text, together
 from scenewright.stages.plan.given_domain import TAUGHT, GivenDomain
-from scenewright.stages.plan.symbols import parse_goal, task_problem
+from scenewright.stages.plan.symbols import near, parse_goal, task_problem
 from scenewright.stages.plan.world_model import WorldModel
 
 MOST_GOALS, GOAL_STATES = 6, 6000
@@ -103,10 +103,10 @@ class Reading:
             return _of_chain(objects, atom, quantified)
         argument_count = len(self.given.domain.predicates[name])
         if len(atom) - 1 != argument_count:
-            raise UsageError(f"goal {text!r}: {name} takes {argument_count} arguments")
+            raise UsageError(f"goal {text!r}: {name} takes {argument_count} arguments", hint=HINT)
         for term in atom[1:]:
             if term not in objects:
-                raise UsageError(f"goal {text!r}: the scene has no {term!r}")
+                raise UsageError(f"goal {text!r}: the scene has no {term!r}", hint=near(term, objects))
         if name not in self.given.seen and name in DOMAIN.predicates:
             return _of_chain(objects, atom, quantified)
         return frozenset({(self.given.name_here(name), *atom[1:])})

@@ -63,7 +63,7 @@ NOISY = (
     "placing are planned anew from where the robot stands then"
 )
 CAMERAS = (
-    "before each action the planned shapes of what it names were fitted to rendered depth pictures: how what can be "
+    "before each action the planned shapes of what it names were fitted to rendered depth images: how what can be "
     "carried lies and, from near by, how large it is, where furniture stands and how far it is open; of a tray from "
     "near by the shape was seen; from over things where the hand was free; all else it knew from the planned scene. "
     "Whether an action had its effect is told by the room"

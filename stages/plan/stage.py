@@ -332,6 +332,9 @@ def _write(
     }
     if is_marginal(plan.margin):
         summary["verdict"] = "marginal"
+    if not ok and plan.failures:
+        last = plan.failures[-1]
+        summary["reason"] = f"{last.kind}: {last.message}; `scenewright explain PLAN outcome` says all"
     return Plan(context.output, outcome="ok" if ok else status, summary=summary)
 
 

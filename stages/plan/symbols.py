@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scenewright.schemas.contact_graph import ContactGraphFile
@@ -138,13 +139,13 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
         if predicate not in allowed:
             raise UsageError(f"goal {literal!r}: no predicate {predicate!r}", hint=f"known: {', '.join(allowed)}")
         if len(arguments) != len(allowed[predicate]):
-            raise UsageError(f"goal {literal!r}: {predicate} takes {len(allowed[predicate])} arguments")
+            raise UsageError(
+                f"goal {literal!r}: {predicate} takes {len(allowed[predicate])} arguments",
+                hint=f"write it like {predicate}({', '.join(allowed[predicate])})",
+            )
         for name in arguments:
             if name not in objects:
-                similar_names = difflib.get_close_matches(name, objects, n=3, cutoff=0.4)
-                raise UsageError(
-                    f"goal {literal!r}: the scene has no {name!r}", hint=f"near: {', '.join(similar_names) or 'none'}"
-                )
+                raise UsageError(f"goal {literal!r}: the scene has no {name!r}", hint=near(name, objects))
         normal.append(atom_text((predicate, *arguments)))
         doors = [name for name in objects if name.startswith(f"{arguments[0]}__")]
         if predicate in ("open", "closed") and objects[arguments[0]] == "container":
@@ -152,9 +153,22 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
             continue
         for name, kind in zip(arguments, allowed[predicate], strict=True):
             if not DOMAIN.is_a(objects[name], kind):
-                raise UsageError(f"goal {literal!r}: {name} is a {objects[name]}, {predicate} needs a {kind}")
+                raise UsageError(
+                    f"goal {literal!r}: {name} is a {objects[name]}, {predicate} needs a {kind}",
+                    hint=f"of that kind: {some([other for other in objects if DOMAIN.is_a(objects[other], kind)])}",
+                )
         atoms.add((predicate, *arguments))
     return frozenset(atoms), tuple(normal)
+
+
+def near(name: str, names: Iterable[str]) -> str:
+    """Return in words which of the names look like one that is none of them."""
+    return f"near: {some(difflib.get_close_matches(name, list(names), n=3, cutoff=0.4))}"
+
+
+def some(names: Sequence[str]) -> str:
+    """Return the first five names in words."""
+    return ", ".join(names[:5]) or "none"
 
 
 def task_problem(objects: dict[str, str], initial: frozenset[Atom], goal: frozenset[Atom]) -> Problem:

@@ -91,7 +91,7 @@ def fridge_to_microwave(facts: SceneFacts) -> Goals:
         raise _no_goal(
             "fridge-to-microwave",
             f"{len(fridges)} fridges with {len(food)} things that the hand can take, {len(ovens)} microwaves within "
-            "reach: none of the things fits into one (what a closed fridge hides can be declared with --assume)",
+            "reach: nothing fits into one (--assume declares what a closed fridge hides)",
             {"fridges": len(fridges), "items": len(food), "microwaves": len(ovens)},
         )
     return [

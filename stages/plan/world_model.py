@@ -76,7 +76,7 @@ class WorldModel(BelievedRoom):
         floors = [name for name, record in self.records.items() if record.class_name == "floor"]
         bounds = [self.world.bounds(name) for name in floors or self.records]
         if not bounds:
-            raise BadInput("the scene has no bodies", hint="look at scene.json")
+            raise BadInput("the scene has no bodies", hint="make it of a map that shows things")
         return np.min([low[:2] for low, _ in bounds], axis=0), np.max([high[:2] for _, high in bounds], axis=0)
 
     # --- beliefs ----------------------------------------------------------------------------------------------

@@ -262,7 +262,7 @@ def _summary(info: PosesFile, result: Result, context: Context) -> dict[str, obj
         what = f"{denied} of {len(info.loops)} places that look the same"
         if contradicted_share(info.loops) <= MOST_CONTRADICTED:
             what = f"the depth of {wrong_frames(info)} of {len(info.frames)} frames"
-        advice = "record more pictures a second, or turn more slowly"
+        advice = "record more images a second, or turn more slowly"
         if info.method == "refine":
             advice = "compare it with that of --method rgbd, which does not look at the given poses"
         summary["reason"] = f"the path denies {what}: it may be off by decimetres; {advice}"

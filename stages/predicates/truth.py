@@ -9,7 +9,7 @@ from functools import cache
 from pydantic import Field
 from scenewright.schemas.base import Model
 from scenewright.schemas.outside import LARGEST_SETTINGS, file_text, file_toml
-from scenewright.schemas.places import data_file
+from scenewright.schemas.places import REINSTALL, data_file
 from scenewright.stages.kit.predicates.evaluating import Evaluator
 from scenewright.stages.kit.predicates.expressions import Predicate, check, read
 from scenewright.stages.kit.predicates.room import ROOM_WORDS
@@ -75,13 +75,13 @@ class Truth:
 def truth_of(domain: str) -> Truth:
     """Return the ground truth of a domain."""
     folder, words = (data_file("room"), ROOM_WORDS) if domain == ROOM else (data_file("kitchen"), KITCHEN_WORDS)
-    file = TruthFile.model_validate(file_toml(folder / "truth.toml", LARGEST_SETTINGS))
+    file = TruthFile.model_validate(file_toml(folder / "truth.toml", hint=REINSTALL))
     predicates = {
         name: Predicate(name, meant.arguments, read(meant.means, f"truth.toml, {name}"))
         for name, meant in file.predicates.items()
     }
     check(predicates, words)
-    operators = parse_domain(file_text(folder / f"{domain}.pddl", LARGEST_SETTINGS))
+    operators = parse_domain(file_text(folder / f"{domain}.pddl", LARGEST_SETTINGS, hint=REINSTALL))
     return Truth(domain, words, file, predicates, operators)
 
 

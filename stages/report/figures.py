@@ -102,8 +102,8 @@ GROUPS: tuple[tuple[str, tuple[Measure, ...]], ...] = (
     (
         "CAD scene",
         (
-            Measure("cad/replaced", "Objects replaced by CAD models", whole, "higher"),
-            Measure("cad/true_objects", "… of true objects seen", whole),
+            Measure("cad/replaced", "Things replaced by CAD models", whole, "higher"),
+            Measure("cad/true_objects", "… of true things seen", whole),
             Measure("cad/class_match", "Right class", percent, "higher"),
             Measure("cad/model_top1", "The very model", percent, "higher"),
             Measure("cad/model_in_candidates", "The very model among the candidates", percent, "higher"),
@@ -124,7 +124,7 @@ GROUPS: tuple[tuple[str, tuple[Measure, ...]], ...] = (
             Measure(
                 "replacement/scan2cad_success", "Right class, within 20 cm, 20°, 20 % (Scan2CAD)", percent, "higher"
             ),
-            Measure("replacement/scan2cad_success_detected", "… of the detected objects", percent, "higher"),
+            Measure("replacement/scan2cad_success_detected", "… of the detected things", percent, "higher"),
             Measure("replacement_before_check/scan2cad_success", "… before the global check", percent, "higher"),
             Measure("replacement/true_model_first", "The true model is the first candidate", percent, "higher"),
             Measure("replacement/class_right", "Class of the chosen model right", percent, "higher"),
@@ -167,7 +167,7 @@ GROUPS: tuple[tuple[str, tuple[Measure, ...]], ...] = (
             Measure("counts/frames_dropped", "Frames dropped", whole),
             Measure("counts/entities", "Entities in the map", whole),
             Measure("counts/labelled_vertices_share", "Map surface with a label", percent),
-            Measure("counts/support_edges", "Support edges of objects", whole),
+            Measure("counts/support_edges", "Support edges of things", whole),
             Measure("counts/edges_proximal", "Proximal edges", whole),
             Measure("counts/floor_height_rms_m", "Floor off z = 0, root mean square", from_metres),
             Measure("counts/floor_tilt_rad", "Floor tilt", degrees),

@@ -40,7 +40,7 @@ def checked_scenes(cad_scene: CadScene, shelf: ModelShelf) -> list[CheckedScene]
     scene = cad_scene.info
     steps: list[tuple[str, Callable[[Replacement], CadCandidate | None]]] = [("After the global check", after_check)]
     if any(r.best_single is not None for r in scene.replacements):
-        steps.insert(0, ("Before the global check, every object by itself", before_check))
+        steps.insert(0, ("Before the global check, every thing by itself", before_check))
     scenes = []
     for title, choose in steps:
         candidates = {r.node: choose(r) for r in scene.replacements if r.decision != "layout"}

@@ -50,7 +50,9 @@ def from_file(path: Path, alt: str, width: int) -> Picture:
     try:
         with Image.open(path) as opened:
             if opened.width * opened.height > MAXIMUM_PIXELS:
-                raise BadInput(f"{path}: {opened.width} x {opened.height} is too large a picture")
+                raise BadInput(
+                    f"{path}: {opened.width} x {opened.height} is too large an image", hint="make a smaller one"
+                )
             image = opened.convert("RGB")
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise BadInput(f"{path}: {error}", hint="make the artifact again") from None

@@ -91,7 +91,7 @@ def _trajectory(facts: Facts) -> Outlook:
     sound = (f"{posed} of {frames} frames have an estimated pose",)
     doubtful = (HELD_UPRIGHT,) if facts.summary.get("gravity") == "mean_camera_up" else ()
     missing = (f"{frames - posed} frames whose place was not found",) if posed < frames else ()
-    advice = ("move the camera slowly, so that neighbouring pictures share most of what they show",) if missing else ()
+    advice = ("move the camera slowly, so that neighbouring images share most of what they show",) if missing else ()
     return Outlook(sound, doubtful, missing, advice)
 
 
@@ -102,7 +102,7 @@ def _segments(facts: Facts) -> Outlook:
         return Outlook(doubtful=(f"what things are: the masks are {label}",), advice=(advice,))
     if not label or "ground-truth" in label:
         return Outlook()
-    return Outlook(doubtful=(f"names and outlines are those of {label}: look at the pictures first",))
+    return Outlook(doubtful=(f"names and outlines are those of {label}: look at the images first",))
 
 
 def _panoptic_map(facts: Facts) -> Outlook:
@@ -139,18 +139,24 @@ def _contact_graph(facts: Facts) -> Outlook:
 
 
 def _cad_scene(facts: Facts) -> Outlook:
-    models, built, meshes = (facts.count(name) for name in ("cad", "built_in", "mesh"))
-    thing_count, error = models + built + meshes, facts.number("alignment_error_median")
+    models, parts, built, meshes = (facts.count(name) for name in ("cad", "of_families", "built_in", "mesh"))
+    thing_count, error = models + parts + built + meshes, facts.number("alignment_error_median")
     sound, doubtful, missing, advice = [], [], [], []
     if models:
         fit = f", the middle one within {1000 * error:.0f} mm of what was seen" if error else ""
         sound.append(f"{models} of {thing_count} things have a CAD model{fit}")
+    if parts:
+        sound.append(
+            f"parts that were fitted one by one stand for {parts} of {thing_count} things, which no model explains"
+        )
     if built:
         sound.append(f"boxes that were made for {built} of {thing_count} things, which no model fits, stand for them")
     if meshes:
         doubtful.append(f"{meshes} of {thing_count} things keep their scanned mesh: no doors, nothing behind them")
     if meshes > MANY_MESHES * thing_count:
         advice.append("walk around what matters, closer; add models of your own things (scenewright library add)")
+    if facts.number("unexplained_m2") >= 1:
+        missing.append(f"{facts.number('unexplained_m2'):.1f} m² of mapped surface that nothing in the scene explains")
     if facts.number("surroundings_m2") >= 1:
         missing.append(f"what {facts.number('surroundings_m2'):.1f} m² of mapped surface belong to")
     return Outlook(tuple(sound), tuple(doubtful), tuple(missing), tuple(advice))

@@ -14,6 +14,7 @@ from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.evaluation import Evaluation
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.segments import Segments
+from scenewright.stages.kit.explaining.sources import Source, sources_of
 from scenewright.stages.report.parameters import ReportParameters
 from scenewright.stages.report.provenance import Made, made_of
 from scenewright.stages.report.room import RoomViews
@@ -58,6 +59,11 @@ class Page:
     def made(self) -> tuple[Made, ...]:
         """How every artifact was made."""
         return tuple(made_of(self.artifacts, self.output))
+
+    @cached_property
+    def sources(self) -> list[Source]:
+        """What the artifacts record of why things are as they are. Raises BadInput for a payload that is damaged."""
+        return sources_of(self.artifacts.values())
 
     @cached_property
     def room(self) -> RoomViews:

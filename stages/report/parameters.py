@@ -18,9 +18,9 @@ class ReportParameters(Parameters):
 
     title: str = Field("", description="Title of the page; empty: made from the inputs")
     frames: int = Field(6, ge=0, le=24, description="Input frames shown")
-    frame_width: int = Field(400, ge=120, le=1280, description="Width of frame pictures [px]")
+    frame_width: int = Field(400, ge=120, le=1280, description="Width of frame images [px]")
     view_width: int = Field(960, ge=240, le=1920, description="Width of rendered views [px]")
-    candidates: int = Field(4, ge=0, le=12, description="CAD candidates shown of each object, 0: none")
+    candidates: int = Field(4, ge=0, le=12, description="CAD candidates shown of each thing, 0: none")
     candidate_width: int = Field(150, ge=60, le=480, description="Width of the pictures of candidates [px]")
     keyframes: int = Field(16, ge=0, le=40, description="Key frames of the plan shown at most")
 

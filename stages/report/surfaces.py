@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import trimesh
-from scenewright.schemas.cad_scene import SURROUNDINGS, CadCandidate, CadScene
+from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadCandidate, CadScene
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.vocabulary import load_vocabulary
-from scenewright.stages.kit.drawing.palette import LAYOUT_COLORS, UNLABELLED, entity_color
+from scenewright.stages.kit.drawing.palette import LAYOUT_COLORS, UNEXPLAINED_COLOR, UNLABELLED, entity_color
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.formats.numpy_files import read_arrays
 from scenewright.stages.kit.formats.scene_links import INFERRED
@@ -23,8 +23,8 @@ from scenewright.stages.kit.measurement.cad_candidates import after_check
 from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
 from scenewright.stages.report.placed_models import ModelShelf
 
-NAMELESS = 99_999
-"""Instance of the surroundings; no node has it."""
+NAMELESS, NOT_EXPLAINED = 99_999, 99_998
+"""Instances of the surroundings, and of what nothing explains; no node has them."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,10 @@ def map_model(panoptic_map: PanopticMap) -> Model | None:
     (labels,) = read_arrays(panoptic_map.path("mesh_labels.npz"), "instance", shapes=("V",), hint="make the map again")
     labels = labels.astype(np.int64)
     if len(labels) != len(mesh.vertices):
-        raise BadInput(f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices")
+        raise BadInput(
+            f"{panoptic_map.root.name}: {len(labels)} labels for {len(mesh.vertices)} vertices",
+            hint="make the panoptic map again",
+        )
     a, b, c = labels[mesh.faces].T
     instance = np.where((b == c) & (a != b), b, a)
     is_kept = np.linalg.norm(mesh.face_normals, axis=1) > 0.5
@@ -127,12 +130,17 @@ def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray:
 
 
 def cad_model(
-    cad_scene: CadScene, shelf: ModelShelf | None = None, candidates: Mapping[str, CadCandidate | None] | None = None
+    cad_scene: CadScene,
+    shelf: ModelShelf | None = None,
+    candidates: Mapping[str, CadCandidate | None] | None = None,
+    *,
+    with_unexplained: bool = False,
 ) -> Model | None:
     """The CAD scene: models where they stand, reconstructed meshes where there is none (what is inferred of them in a
     colour of its own), layout, surroundings.
 
     `candidates`: node -> what stands for it, instead of what the scene chose; their models come from `shelf`.
+    `with_unexplained`: with what nothing in the scene explains, in a colour of its own too.
     """
     shelf = shelf or ModelShelf(cad_scene)
     nodes = {node.id: node for node in cad_scene.graph.nodes}
@@ -163,14 +171,23 @@ def cad_model(
     nameless = _load(cad_scene, f"meshes/{SURROUNDINGS}.ply") if candidates is None else None
     if nameless is not None:
         meshes.append((NAMELESS, nameless))
+    rest = _load(cad_scene, UNEXPLAINED) if with_unexplained else None
+    if rest is not None:
+        meshes.append((NOT_EXPLAINED, _painted(rest.vertices, rest.faces, UNEXPLAINED_COLOR)))
     return Model(build_soup(meshes), classes, names, node_ids) if meshes else None
 
 
 def _inferred(corners: np.ndarray) -> trimesh.Trimesh:
     """Return a convex piece, corners (N, 3), in the colour of what nobody saw."""
     solid = hull_or_box(corners)
-    color = np.round(255 * np.array(INFERRED)).astype(np.uint8)
-    return trimesh.Trimesh(solid.vertices, solid.faces, vertex_colors=color, process=False)
+    return _painted(solid.vertices, solid.faces, INFERRED)
+
+
+def _painted(vertices: np.ndarray, faces: np.ndarray, color: Sequence[float]) -> trimesh.Trimesh:
+    """Return a mesh in one colour (sRGB, 0 to 1)."""
+    return trimesh.Trimesh(
+        vertices, faces, vertex_colors=np.round(255 * np.array(color)).astype(np.uint8), process=False
+    )
 
 
 def true_model(truth: GroundTruth, world_from_log: np.ndarray) -> Model | None:

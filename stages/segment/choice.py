@@ -157,12 +157,18 @@ def _refuse_options_of_others(request: BackendRequest, chosen: tuple[BackendDecl
         for option in declared.exclusive:
             is_set = getattr(parameters, option) != type(parameters).model_fields[option].default
             if is_set and declared.name not in names:
-                raise UsageError(f"--{option.replace('_', '-')} is for --backend {declared.name} alone")
+                raise UsageError(
+                    f"--{option.replace('_', '-')} is for --backend {declared.name} alone",
+                    hint="leave it out, or choose that backend",
+                )
     given = {"tiles": parameters.tiles is not None, "semantic_weights": request.semantic_weights is not None}
     for option, is_given in given.items():
         if is_given and not any(option in declared.takes for declared in chosen):
             takers = [declared.name for declared in all_backends() if option in declared.takes]
-            raise UsageError(f"--{option.replace('_', '-')} is for --backend {', '.join(takers)}")
+            raise UsageError(
+                f"--{option.replace('_', '-')} is for --backend {', '.join(takers)}",
+                hint="leave it out, or choose that backend",
+            )
 
 
 def _require_streams(sequence: Sequence, chosen: BackendDeclaration) -> None:

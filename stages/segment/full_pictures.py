@@ -20,7 +20,7 @@ class OnFullPictures:
 
     def __init__(self, backend: Backend, reader: FrameReader) -> None:
         self._backend, self._reader = backend, reader
-        self.name, self.label = backend.name, f"{backend.label}, on full pictures"
+        self.name, self.label = backend.name, f"{backend.label}, on full images"
         self.streams = (*backend.streams, "picture")
 
     def __getattr__(self, name: str) -> Any:

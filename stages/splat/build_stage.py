@@ -49,14 +49,14 @@ def run(
             else:
                 views.append(view)
         if not views:
-            raise BadInput(f"{sequence.root}: all {len(learned_frames)} pictures are dark", hint="record in more light")
+            raise BadInput(f"{sequence.root}: all {len(learned_frames)} images are dark", hint="record in more light")
         if all(view.depth is None or not view.depth.any() for view in views):
             with context.progress.step("points"):
                 views = with_points(views, context.seed)
             if not any(view.depth is not None and view.depth.any() for view in views):
                 raise BadInput(
-                    f"{sequence.root}: no picture has depth, and no feature is seen from two places",
-                    hint="record depth, or pictures that overlap; scenewright inspect LOG checks the poses",
+                    f"{sequence.root}: no image has depth, and no feature is seen from two places",
+                    hint="record depth, or images that overlap; scenewright inspect LOG checks the poses",
                 )
         cameras = {view.camera_name: view.camera for view in views}
         trainer = Trainer(

@@ -121,7 +121,7 @@ def answers_table(firsts: list[First], least: float) -> Table:
     columns = ("text", "there", "probability", "answer", "x [m]", "y [m]", "z [m]")
     note = (
         f"An answer counts from probability {least:g} on; nothing that is not there has a right one; "
-        "unknown: below it, of words or pictures that the encoder has never learned."
+        "unknown: below it, of words or images that the encoder has never learned."
     )
     return Table("answers", "First answers", columns, tuple(rows), note)
 
@@ -132,7 +132,7 @@ def _notes(finder: Finder, firsts: list[First]) -> tuple[str, ...]:
     if not finder.calibration.fitted:
         notes.append("Nothing was fitted for this encoder: its probabilities are relevancies.")
     if finder.is_strange:
-        notes.append("The pictures are near nothing that the encoder has learned; hardly anything is believed.")
+        notes.append("The images are near nothing that the encoder has learned; hardly anything is believed.")
     unread = sorted({word for first in firsts for word in finder.encoder.unread(first.text)})
     if unread:
         notes.append(f"The encoder has never read {', '.join(unread)}.")

@@ -45,7 +45,7 @@ def run(
         posed = posed_frames(reader, sequence, trajectory)
         frames = evenly([frame for frame, _ in posed], parameters.most_views) if entities else []
         poses = dict(posed)
-        for frame in context.progress.track(frames, total=len(frames), description="pictures"):
+        for frame in context.progress.track(frames, total=len(frames), description="images"):
             frame_read = reader.read(frame, ("color", "depth"))
             if frame_read.color is not None and frame_read.depth is not None:
                 sights.append(sight_of(reader, frame_read, frame_read.depth, inverse(poses[frame])))

@@ -64,10 +64,11 @@ def run(
     with FrameReader(sequence.path("frames.mcap")) as reader:
         poses = dict(posed_frames(reader, sequence, splat))
         chosen = evenly(frames, parameters.most_views) if len(gaussians) else []
-        for frame in context.progress.track(chosen, total=len(chosen), description="pictures"):
+        for frame in context.progress.track(chosen, total=len(chosen), description="images"):
             if frame not in poses:
                 raise BadInput(
-                    f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence"
+                    f"{sequence.root}: frame {frame} is not there: the splat was built from another sequence",
+                    hint="give that sequence",
                 )
             frame_read = reader.read(frame, ("color", "depth"))
             if frame_read.color is None:

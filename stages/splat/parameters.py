@@ -25,25 +25,22 @@ class BuildParameters(Parameters):
     """Options of `splat build`. Rates of learning and of density belong to the method: stages/splat/methods."""
 
     method: Literal["ours", "thesis"] = Field("ours", description="Who sets, moves and removes Gaussians")
-    width: int = Field(320, ge=16, le=4096, description="Pictures are learned at most so wide [px]")
-    most_views: int = Field(200, ge=0, le=100_000, description="At most so many pictures, evenly spread; 0: all")
-    hold_out_every: int = Field(0, ge=0, le=1000, description="Every so many-th picture is kept from learning; 0: none")
+    width: int = Field(320, ge=16, le=4096, description="Images are learned at most so wide [px]")
+    most_views: int = Field(200, ge=0, le=100_000, description="At most so many images, evenly spread; 0: all")
+    hold_out_every: int = Field(0, ge=0, le=1000, description="Every so many-th image is kept from learning; 0: none")
     steps_per_second: float = Field(
-        20.0,
-        ge=0.0,
-        le=10_000.0,
-        description="Steps of training in a second of the log: pictures arrive by their stamps",
+        20.0, ge=0.0, le=10_000.0, description="Steps of training in a second of the log: images arrive by their stamps"
     )
-    steps: int = Field(1000, ge=0, le=1_000_000, description="Steps after the last picture has arrived")
+    steps: int = Field(1000, ge=0, le=1_000_000, description="Steps after the last image has arrived")
     most_gaussians: int = Field(
-        500_000, ge=1, le=10_000_000, description="New pictures bring no further Gaussians once there are so many"
+        500_000, ge=1, le=10_000_000, description="New images bring no further Gaussians once there are so many"
     )
     refine_poses: bool = Field(False, description="Learn the poses too, but for the first")
     adjust_every: int = Field(
         0,
         ge=0,
         le=100_000,
-        description="Poses of all pictures so far are adjusted to each other, by depth and colour, when so many more "
+        description="Poses of all images so far are adjusted to each other, by depth and colour, when so many more "
         "have arrived, and after the last; 0: never",
     )
 
@@ -51,7 +48,7 @@ class BuildParameters(Parameters):
 class RenderParameters(Parameters):
     """Options of `splat render`."""
 
-    views: Literal["held_out", "learned", "all"] = Field("held_out", description="Which pictures are compared")
+    views: Literal["held_out", "learned", "all"] = Field("held_out", description="Which images are compared")
     pictures: int = Field(12, ge=0, le=10_000, description="At most so many are written, evenly spread")
     turntable: int = Field(36, ge=0, le=360, description="Pictures of a turn about the whole, from above; 0: none")
 
@@ -60,17 +57,13 @@ class LanguageParameters(EncoderParameters):
     """Options of `splat language`."""
 
     steps: int = Field(400, ge=0, le=1_000_000, description="Steps of training the field")
-    most_views: int = Field(
-        60, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all"
-    )
+    most_views: int = Field(60, ge=0, le=100_000, description="At most so many images are read, evenly spread; 0: all")
 
 
 class LabelParameters(EncoderParameters):
     """Options of `splat label`."""
 
-    most_views: int = Field(
-        120, ge=0, le=100_000, description="At most so many pictures are read, evenly spread; 0: all"
-    )
+    most_views: int = Field(120, ge=0, le=100_000, description="At most so many images are read, evenly spread; 0: all")
 
 
 class QueryParameters(EncoderParameters):
@@ -101,7 +94,7 @@ def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
 
 BUILD = Stage(
     name="splat build",
-    summary="Learn a room as 3-D Gaussians from posed pictures that arrive one after another",
+    summary="Learn a room as 3-D Gaussians from posed images that arrive one after another",
     parameters=BuildParameters,
     reads={"sequence": Sequence, "trajectory": Optionally(Trajectory)},
     writes=Splat,
@@ -121,7 +114,7 @@ RENDER = Stage(
 )
 LANGUAGE = Stage(
     name="splat language",
-    summary="Keep in a splat what its pictures say, so that words find places",
+    summary="Keep in a splat what its images say, so that words find places",
     parameters=LanguageParameters,
     reads={"splat": Splat, "sequence": Sequence, "panoptic_map": Optionally(PanopticMap), "weights": WEIGHTS},
     writes=LanguageMap,
@@ -134,7 +127,7 @@ LANGUAGE = Stage(
 )
 LABEL = Stage(
     name="splat label",
-    summary="Keep what pictures show of every entity of a panoptic map, so that words find it",
+    summary="Keep what images show of every entity of a panoptic map, so that words find it",
     parameters=LabelParameters,
     reads={"panoptic_map": PanopticMap, "sequence": Sequence, "trajectory": Optionally(Trajectory), "weights": WEIGHTS},
     writes=LanguageMap,

@@ -53,7 +53,9 @@ def read_gaussians(path: Path) -> Gaussians:
     if count < 0 or data[:end] != _header(count):
         raise BadInput(f"{path}: no PLY of Gaussians in the expected order", hint="make the splat again")
     if len(data) - end != count * len(COLUMNS) * 4:
-        raise BadInput(f"{path}: torn: {len(data) - end} bytes, expected {count * len(COLUMNS) * 4}")
+        raise BadInput(
+            f"{path}: torn: {len(data) - end} bytes, expected {count * len(COLUMNS) * 4}", hint="make the splat again"
+        )
     table = np.frombuffer(data[end:], "<f4").reshape(count, len(COLUMNS)).copy()
     if not np.isfinite(table).all() or (count and (table[:, -4:] == 0).all(axis=1).any()):
         raise BadInput(f"{path}: a Gaussian has a value that is not a number", hint="make the splat again")

@@ -69,8 +69,8 @@ def run(
         summary["place"] = [round(float(v), 3) for v in finder.place(likely[0].region)]
     if finder.is_strange:
         context.logger.warning(
-            "its pictures are near nothing that the encoder has learned (%.2f, from %.2f on they count as known): "
-            "answers %s; a map that is made with another --encoder may tell more",
+            "its images are near nothing that the encoder has learned (%.2f, known from %.2f on): "
+            "answers %s; a map made with another --encoder may tell more",
             finder.recognised,
             finder.calibration.least_recognised,
             "are guesses" if likely else "would be guesses, which --least-probability 0 shows",

@@ -38,7 +38,8 @@ def run(splat: Splat, sequence: Sequence, *, parameters: RenderParameters, conte
         strangers = [frame for frame in uses if frame not in poses]
         if strangers:
             raise BadInput(
-                f"{sequence.root}: frame {strangers[0]} is not there: the splat was built from another sequence"
+                f"{sequence.root}: frame {strangers[0]} is not there: the splat was built from another sequence",
+                hint="give that sequence",
             )
         for frame in context.progress.track(sorted(uses), total=len(uses), description="views"):
             view = read_view(reader, frame, poses[frame], width)

@@ -159,7 +159,7 @@ class Trainer:
         Raises BadInput where there is nothing to learn from, or where the loss is no number any more.
         """
         if not self.views or not len(self.gaussians):
-            raise BadInput("no Gaussians to train: no picture has depth", hint="give a sequence with depth")
+            raise BadInput("no Gaussians to train: no image has depth", hint="give a sequence with depth")
         learned = self.views[int(self.random.integers(len(self.views)))]
         drawn = self.draw(learned)
         view = learned.view

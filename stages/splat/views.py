@@ -46,7 +46,7 @@ def posed_frames(
     Raises BadInput where there is no colour, or where fewer than two frames have a pose.
     """
     if "color" not in reader.streams:
-        raise BadInput(f"{sequence.root}: its frames have no colour", hint="splats are learned from pictures")
+        raise BadInput(f"{sequence.root}: its frames have no colour", hint="splats are learned from images")
     if trajectory is None:
         frames, poses = reader.poses()
         posed = list(zip(frames.tolist(), poses, strict=True))

@@ -99,7 +99,7 @@ def growing_pairs(folder: Path, *, latest: bool, idle: float, poll: float = 0.02
     `latest`: of those that wait, the last alone. Raises BadInput where there is no folder.
     """
     if not folder.is_dir():
-        raise BadInput(f"{folder}: no folder of pictures", hint="make it before they arrive")
+        raise BadInput(f"{folder}: no folder of images", hint="make it before they arrive")
     done: set[str] = set()
     sizes: dict[str, tuple[int, ...]] = {}
     last = time.monotonic()
@@ -256,13 +256,13 @@ class Follower:
 
     def _picture(self, path: Path) -> np.ndarray:
         """Return a picture (H, W, 3); without its pixels (H, W, 0) where masks are not made of it."""
-        content = file_content(path, LARGEST_PICTURE, hint="give the pictures of both eyes")
+        content = file_content(path, LARGEST_PICTURE, hint="give the images of both eyes")
         picture = _decode(content) if self._cuts else _size_alone(content)
         size = (self._rig.height, self._rig.width)
         if picture is None or picture.shape[:2] != size:
-            shape_text = "no picture" if picture is None else f"{picture.shape[1]} x {picture.shape[0]} pixels"
+            shape_text = "no image" if picture is None else f"{picture.shape[1]} x {picture.shape[0]} pixels"
             raise BadInput(
-                f"{path}: {shape_text}, the rig's are {size[1]} x {size[0]}", hint="rectified pictures of that size"
+                f"{path}: {shape_text}, the rig's are {size[1]} x {size[0]}", hint="rectified images of that size"
             )
         return picture
 

@@ -126,7 +126,7 @@ class _Maps:
         if disparity.shape != pair.left.shape[:2]:
             raise BadInput(
                 f"{self._root}: the disparity of frame {pair.index} is {disparity.shape[1]} x {disparity.shape[0]}, "
-                f"the pictures are {pair.left.shape[1]} x {pair.left.shape[0]}",
+                f"the images are {pair.left.shape[1]} x {pair.left.shape[0]}",
                 hint="make the disparity of this sequence",
             )
         return disparity

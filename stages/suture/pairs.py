@@ -111,7 +111,7 @@ class StereoPairs:
             for side, picture in (("left", frame.color), ("right", frame.right)):
                 if picture.shape[:2] != size:
                     raise BadInput(
-                        f"{self._where}: frame {index}: the {side} picture is {picture.shape[1]} x {picture.shape[0]}, "
+                        f"{self._where}: frame {index}: the {side} image is {picture.shape[1]} x {picture.shape[0]}, "
                         f"the calibration says {size[1]} x {size[0]}",
                         hint="rectify both eyes to one size",
                     )

@@ -133,5 +133,5 @@ def _png(picture: np.ndarray) -> bytes:
     """Return a picture (H, W, 3) uint8 RGB as PNG: JPEG would smear the wire."""
     written, data = cv2.imencode(".png", picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
     if not written:
-        raise OSError("a picture could not be encoded")
+        raise OSError("an image could not be encoded")
     return bytes(data)

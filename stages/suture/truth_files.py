@@ -41,8 +41,8 @@ def read_label_image(path: Path, size: tuple[int, int]) -> np.ndarray:
         raise BadInput(f"{path}: not an 8-bit image of one channel", hint="write masks as grey PNG")
     if picture.shape != size:
         raise BadInput(
-            f"{path}: {picture.shape[1]} x {picture.shape[0]} pixels, the pictures have {size[1]} x {size[0]}",
-            hint="give masks of the rectified pictures at full size",
+            f"{path}: {picture.shape[1]} x {picture.shape[0]} pixels, the images have {size[1]} x {size[0]}",
+            hint="give masks of the rectified images at full size",
         )
     return picture
 

@@ -59,7 +59,7 @@ class SynthesizeParameters(Parameters):
         "and the walk is gone there and back",
     )
     picture_noise: float = Field(
-        0.0, ge=0, le=30, description="Standard deviation of the noise of every pixel of the pictures [of 255]"
+        0.0, ge=0, le=30, description="Standard deviation of the noise of every pixel of the images [of 255]"
     )
 
 

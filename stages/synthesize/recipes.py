@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field, ValidationError
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import BadInput, UsageError, first_problem
-from scenewright.schemas.places import data_file
+from scenewright.schemas.places import REINSTALL, data_file
 
 RECIPE_FOLDER = data_file("recipes")
 """What `--recipe` names lie here."""
@@ -131,6 +131,6 @@ def load_recipe(name: str) -> Recipe:
         with file.open("rb") as stream:
             return Recipe(**tomllib.load(stream))
     except ValidationError as error:
-        raise BadInput(f"{file.name}: {first_problem(error)}") from None
+        raise BadInput(f"{file.name}: {first_problem(error)}", hint=REINSTALL) from None
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"{file.name}: {error}") from None
+        raise BadInput(f"{file.name}: {error}", hint=REINSTALL) from None

@@ -48,7 +48,10 @@ def seen_points(
             points.append(thinned)
             labels.append(thinned_labels)
     if not points or not sum(map(len, points)):
-        raise BadInput(f"{sequence.root}: no frame has a pose and depth up to {maximum_depth:g} m")
+        raise BadInput(
+            f"{sequence.root}: no frame has a pose and depth up to {maximum_depth:g} m",
+            hint="give a sequence with poses and depth",
+        )
     return most_common_labels(np.concatenate(points), np.concatenate(labels))
 
 

@@ -59,9 +59,9 @@ def run(
         try:
             points, labels = surface_points(vertices, faces, owner, SPACING)
         except ValueError as error:
-            raise BadInput(f"{panoptic_map.root}: {error}") from None
+            raise BadInput(f"{panoptic_map.root}: {error}", hint=HINT) from None
     if not labels.any():
-        raise BadInput(f"{panoptic_map.root}: nothing in it has a name and a surface")
+        raise BadInput(f"{panoptic_map.root}: nothing in it has a name and a surface", hint=HINT)
     extent = np.ptp(vertices[owner > 0], axis=0)
     objects = tuple(_true(node, points[labels == node.instance]) for node in nodes)
     info = sequence.info

@@ -40,8 +40,8 @@ def painted_owners(
             votes[seen, told] += 1
     if len(left) == len(outlines.frames):
         raise BadInput(
-            f"no frame of {sequence.root} with depth and a pose has the time of a painted one",
-            hint=f"painted are frames at {min(left):g} to {max(left):g} s: take the same frames from the log",
+            f"{sequence.root}: no frame with depth and a pose has the time of a painted one",
+            hint=f"take the painted frames from the log: {min(left):g} to {max(left):g} s",
         )
     votes[:, 0] = 0
     return votes.argmax(axis=1), sorted(left)

@@ -47,9 +47,13 @@ def _body(
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
     parent = None if link is None or link.source == SCENE_NODE else link.source
+    added = None if replacement is None else replacement.inferred
     if node.model_id is not None:
         if node.world_from_model is None or node.scale is None:
-            raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale")
+            raise BadInput(
+                f"{cad_scene.path('graph.json')}: node {node.id} has a model but no pose or scale",
+                hint="run `cad` again",
+            )
         folder = cad_scene.path("models") / node.model_id
         if not folder.is_dir():
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
@@ -71,11 +75,10 @@ def _body(
             joint_values=dict(node.joints),
             held=frozenset() if replacement is None else replacement.held,
             part_colors={} if replacement is None else dict(replacement.part_colors),
-            because="held: it is built in" if is_built_in else "",
+            because="held: it is built in" if is_built_in else _because(added, ""),
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
-    added = None if replacement is None else replacement.inferred
     inferred = () if added is None else tuple(np.array(corners) for corners in added.pieces)
     held = ""
     if mobile.furniture and node.mark is None and mesh is not None and not _steady(graph, node, mesh, inferred):
@@ -180,5 +183,7 @@ def _box(node: GraphNode, mesh: trimesh.Trimesh | None, cad_scene: CadScene) -> 
     if node.box is not None:
         return node.box
     if mesh is None:
-        raise BadInput(f"{cad_scene.path('graph.json')}: node {node.id} has neither box nor mesh")
+        raise BadInput(
+            f"{cad_scene.path('graph.json')}: node {node.id} has neither box nor mesh", hint="run `cad` again"
+        )
     return box_from_bounds(mesh.bounds[0], mesh.bounds[1])

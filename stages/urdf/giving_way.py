@@ -100,7 +100,7 @@ def given_way(root: Path, bodies: Sequence[BundleBody]) -> list[BundleBody]:
             final[body.name] = pieces[body.name]
         elif changed:
             cut[body.name] = own_pieces if body.movable else changed
-    return [_with(body, cut[body.name]) if body.name in cut else body for body in bodies]
+    return [with_pieces(body, cut[body.name]) if body.name in cut else body for body in bodies]
 
 
 def written_pieces(root: Path) -> dict[str, list[Piece]]:
@@ -140,7 +140,8 @@ def _is_layout(body: BundleBody) -> bool:
     return load_vocabulary().by_name(body.class_name).is_layout
 
 
-def _with(body: BundleBody, cut: Mapping[int, Sequence[Piece]]) -> BundleBody:
+def with_pieces(body: BundleBody, cut: Mapping[int, Sequence[Piece]]) -> BundleBody:
+    """Return a body with pieces in the place of some of its collision shapes, by their number."""
     body_from_world = inverse(body.world_from_body)
     in_body = {
         number: tuple(apply(body_from_world, piece.points) for piece in pieces)

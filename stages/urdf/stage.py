@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from scenewright.schemas.cad_scene import CadScene
 from scenewright.schemas.errors import UsageError
-from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.schemas.interactive_scene import InteractiveScene, InteractiveSceneFile
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from scenewright.stages.kit.simulation.margins import is_marginal
@@ -18,9 +18,11 @@ from scenewright.stages.urdf.bodies import scene_bodies
 from scenewright.stages.urdf.exports import write_exports
 from scenewright.stages.urdf.giving_way import given_way
 from scenewright.stages.urdf.parameters import UrdfParameters
+from scenewright.stages.urdf.piece_merging import merged_bodies
 from scenewright.stages.urdf.resting import rested_bodies
 from scenewright.stages.urdf.settle_margins import with_margins
 from scenewright.stages.urdf.settle_report import SettleReport, settle_file, settle_report
+from scenewright.stages.urdf.spawning import spawn_of
 from scenewright.stages.urdf.wedged import wedged_furniture
 
 
@@ -33,24 +35,35 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
     with context.progress.step("read the CAD scene"):
         graph = cad_scene.graph
         bodies = scene_bodies(cad_scene, graph, movable, parameters.fixed_classes)
+        spawn = spawn_of(bodies)
+
+    def write(bodies: list[BundleBody]) -> InteractiveSceneFile:
+        return write_scene_bundle(context.output, bodies, graph, spawn)
+
     with context.progress.step("write and check the kinematic tree"):
-        scene = write_scene_bundle(context.output, bodies, graph)
+        scene = write(bodies)
     with context.progress.step("cut meshes that lie in other things"):
         bodies = given_way(context.output, bodies)
     cut = sum(bool(body.cut) for body in bodies)
     if cut:
-        scene = write_scene_bundle(context.output, _for_rewriting(bodies), graph)
+        scene = write(_for_rewriting(bodies))
     wedged = _find_wedged(context)
     if wedged:
         bodies = _hold(context.output, bodies, wedged)
-        scene = write_scene_bundle(context.output, bodies, graph)
+        scene = write(bodies)
+    with context.progress.step("merge small pieces"):
+        before, bodies = bodies, merged_bodies(context.output, bodies)
+        merged = [body.name for body, whole in zip(bodies, before, strict=True) if body is not whole]
+    if merged:
+        _remove_shapes(context.output, merged)
+        scene = write(_for_rewriting(bodies))
     rested = 0
     if parameters.rest:
         with context.progress.step("lay movable bodies down"):
             laid = rested_bodies(context.output, bodies)
             rested = sum(body.reconstructed is not None for body in laid)
             if rested:
-                scene = write_scene_bundle(context.output, _for_rewriting(laid), graph)
+                scene = write(_for_rewriting(laid))
     with context.progress.step("write what stands beside it"):
         write_exports(context.output, scene)
     summary: dict[str, float | str] = {
@@ -89,14 +102,20 @@ def _hold(root: Path, bodies: list[BundleBody], wedged: Mapping[str, str]) -> li
     removes what only free ones have there."""
     for name in wedged:
         (root / "bodies" / f"{name}.urdf").unlink()
-        for pattern in ("collision_*.obj", "cut_*.obj"):
-            for file in (root / "meshes" / name).glob(pattern):
-                file.unlink()
+    _remove_shapes(root, wedged)
     rewritten = _for_rewriting(bodies)
     return [
         replace(body.as_held(f"it lies in {wedged[body.name]}"), cut={}) if body.name in wedged else body
         for body in rewritten
     ]
+
+
+def _remove_shapes(root: Path, names: Iterable[str]) -> None:
+    """Remove the collision shapes of bodies that keep their mesh; another writing makes those that are needed."""
+    for name in names:
+        for pattern in ("collision_*.obj", "cut_*.obj"):
+            for file in (root / "meshes" / name).glob(pattern):
+                file.unlink()
 
 
 def _for_rewriting(bodies: Sequence[BundleBody]) -> list[BundleBody]:
@@ -145,6 +164,6 @@ def _movable_classes(parameters: UrdfParameters) -> frozenset[str]:
     names = {entry.name for entry in vocabulary.classes}
     for name in (*parameters.movable_classes, *parameters.fixed_classes):
         if name not in names:
-            raise UsageError(f"class {name!r} is not in the vocabulary")
+            raise UsageError(f"class {name!r} is not in the vocabulary", hint="name a class of data/vocabulary.toml")
     movable = {entry.name for entry in vocabulary.classes if entry.movable} | set(parameters.movable_classes)
     return frozenset(movable - set(parameters.fixed_classes))

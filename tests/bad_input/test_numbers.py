@@ -73,7 +73,7 @@ def test_numbers_at_the_bounds(tmp_path: Path) -> None:
 def test_values_of_a_file_of_others() -> None:
     with pytest.raises(BadInput, match=r"^a.mcap: cx = 1e.20: .*less than .* .give --cx.$"):
         Camera.of_outside("a.mcap", hint="give --cx", width=1, height=1, fx=1.0, fy=1.0, cx=1e20, cy=0.0)
-    assert Camera.of_outside("a", width=1, height=2, fx=1.0, fy=1.0, cx=0.0, cy=0.0).height == 2
+    assert Camera.of_outside("a", hint="", width=1, height=2, fx=1.0, fy=1.0, cx=0.0, cy=0.0).height == 2
 
 
 def test_focal_lengths_of_a_pair() -> None:

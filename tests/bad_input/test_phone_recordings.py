@@ -78,7 +78,7 @@ def test_a_torn_video(tmp_path: Path, take: Take) -> None:
     said = refused(log)
     assert "rgb.mp4: is not a video that can be read: it was cut" in said and "its depth alone is read" in said
     (log / "rgb.mp4").unlink()  # the advice
-    assert "is not that of pictures of 1920x1440 pixels (give --fx" in refused(log)
+    assert "is not that of images of 1920x1440 pixels (give --fx" in refused(log)
     for text, options in ((None, {"fx": 42.7, "fy": 42.8, "cx": 32.1, "cy": 23.2}), (OF_ARKIT, {})):
         if text is not None:
             (log / "camera_matrix.csv").write_text(text)
@@ -139,7 +139,7 @@ def test_a_video_that_was_turned_by_a_converter(tmp_path: Path, take: Take) -> N
     log = write_stray_scanner(tmp_path / "log", take)
     upright = [np.ascontiguousarray(np.rot90(picture)) for picture in take.pictures]
     write_video(log / "rgb.mp4", upright, turned=False)
-    assert "pictures of 360x480 do not have the shape of 480x360" in refused(log)
+    assert "images of 360x480 do not have the shape of 480x360" in refused(log)
 
 
 def test_pictures_of_a_wide_video_beside_square_depth(tmp_path: Path, take: Take) -> None:
@@ -158,7 +158,7 @@ def test_pictures_of_a_wide_video_beside_square_depth(tmp_path: Path, take: Take
         ("odometry.csv", "x, x, y, z, qx, qy, qz, qw\n1, 1, 1, 1, 0, 0, 0, 1\n", "names a column twice"),
         ("camera_matrix.csv", "320, 0, 240", "is not a 3x3 camera matrix"),
         ("camera_matrix.csv", "a, 0, 240\n0, 320, 180\n0, 0, 1", "holds a value that is not a number"),
-        ("camera_matrix.csv", "320, 0, 20\n0, 320, 180\n0, 0, 1", "is not that of pictures of 480x360"),
+        ("camera_matrix.csv", "320, 0, 20\n0, 320, 180\n0, 0, 1", "is not that of images of 480x360"),
         ("camera_matrix.csv", "0, 0, 240\n0, 320, 180\n0, 0, 1", "are those of no camera"),
     ],
 )
@@ -281,7 +281,7 @@ def test_pictures_that_were_turned_alone(tmp_path: Path, take: Take) -> None:
     path = write_r3d(tmp_path / "take.r3d", take)
     for index, picture in enumerate(take.pictures):
         with_entry(path, f"rgbd/{index}.jpg", jpeg(np.rot90(picture)))
-    assert "pictures of 360x480 do not have the shape of 480x360, of which the intrinsics are: they were turned" in (
+    assert "images of 360x480 do not have the shape of 480x360, of which the intrinsics are: they were turned" in (
         refused(path)
     )
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from scenewright.cli.edit_command import asked_edit
 from scenewright.cli.edit_forms import forms_of
-from scenewright.cli.explaining.explaining import sentences
+from scenewright.cli.explaining import sentences
 from scenewright.cli.viewing.desk.asking import Asking
 from scenewright.cli.viewing.desk.subjects import subjects_of
 from scenewright.cli.viewing.view import viewer_of

@@ -10,7 +10,7 @@ from scenewright.schemas.apartment import Apartment, Door, Furniture, Room, Thin
 from scenewright.schemas.base import Model
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.outside import file_toml
-from scenewright.schemas.places import data_file
+from scenewright.schemas.places import REINSTALL, data_file
 
 RECIPE = data_file("agent/apartment.toml")
 TRIES = 60
@@ -50,7 +50,7 @@ class Recipe(Model):
 @cache
 def recipe() -> Recipe:
     """Return the committed recipe."""
-    return Recipe.model_validate(file_toml(RECIPE))
+    return Recipe.model_validate(file_toml(RECIPE, hint=REINSTALL))
 
 
 class NoRoom(Exception):

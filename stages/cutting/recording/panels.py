@@ -43,9 +43,9 @@ class Panels:
         the eye. Raises NoCut."""
         which = (points[:, 0] // WIDTH).astype(int)
         if (points < 0).any() or (points[:, 1] >= HEIGHT).any() or which.max() >= len(self.poses):
-            raise NoCut("a click is outside the picture")
+            raise NoCut("a click is outside the image")
         if which[0] != which[1]:
-            raise NoCut("the clicks are on two pictures: click twice on the same one")
+            raise NoCut("the clicks are on two images: click twice on the same one")
         if np.linalg.norm(points[1] - points[0]) < SHORTEST:
             raise NoCut("the clicks are too close to each other to say a line")
         along = points[0] + np.linspace(0.0, 1.0, 4 * WIDTH)[:, None] * (points[1] - points[0])

@@ -45,9 +45,9 @@ def read_pictures(folder: Path) -> list[tuple[View, np.ndarray]]:
     """Return the views in a folder with their colour pictures (H, W, 3) uint8. Raises BadInput."""
     folders = [folder] if (folder / "camera.json").exists() else sorted(p.parent for p in folder.glob("*/camera.json"))
     if not folders:
-        raise BadInput(f"{folder}: holds no pictures", hint=HINT)
+        raise BadInput(f"{folder}: holds no images", hint=HINT)
     if len(folders) > MOST_CAMERAS:
-        raise BadInput(f"{folder}: pictures of {len(folders)} cameras, at most {MOST_CAMERAS}", hint=HINT)
+        raise BadInput(f"{folder}: images of {len(folders)} cameras, at most {MOST_CAMERAS}", hint=HINT)
     return [_read_view(each) for each in folders]
 
 
@@ -69,7 +69,7 @@ def _decode(path: Path, kind: np.dtype, dimensions: int, camera: Camera) -> np.n
     if may_be_decoded(data):
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
-        raise BadInput(f"{path}: no picture", hint=HINT)
+        raise BadInput(f"{path}: no image", hint=HINT)
     if image.dtype != kind or image.ndim != dimensions or (dimensions == 3 and image.shape[2] != 3):
         raise BadInput(
             f"{path}: {image.dtype} of {image.ndim} dimensions; depth has 16 bits, colour 8 bits of three channels",

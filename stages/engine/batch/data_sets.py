@@ -23,7 +23,7 @@ def _read_list(file: Path, where: str) -> list[str]:
     try:
         lines = file_text(file, LARGEST_LIST, error=UsageError).splitlines()
     except UsageError as error:
-        raise UsageError(f"{where}: list: {error}", hint="a text file with one path a line") from None
+        raise UsageError(f"{where}: list: {error.message}", hint="a text file with one path a line") from None
     lines_with_text = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
     if not lines_with_text:
         raise UsageError(f"{where}: list: {file} names nothing", hint="one path a line")

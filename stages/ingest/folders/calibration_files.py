@@ -25,6 +25,7 @@ from scenewright.stages.ingest.messages.records import CalibrationRecord
 from scenewright.stages.kit.formats.trajectories import read_text
 from scenewright.stages.kit.geometry.transforms import inverse, is_rigid, transform_from
 
+KINDS = "docs/FORMATS.md, Layouts of logs, lists the kinds"
 EXTRINSICS = ("extrinsics.yml", "extrinsics.yaml", "extrinsic.yml", "extrinsic.yaml")
 """What OpenCV's stereo calibration writes beside intrinsics.yml: R and T."""
 LARGEST_FILE = 256_000
@@ -56,7 +57,7 @@ class FolderCalibration:
 def read_calibration(path: Path, camera_number: int = 0) -> FolderCalibration:
     """Read a calibration file of any known kind. Raises BadInput."""
     if path.stat().st_size > LARGEST_FILE:
-        raise BadInput(f"{path}: more than {LARGEST_FILE} bytes is no calibration")
+        raise BadInput(f"{path}: more than {LARGEST_FILE} bytes is no calibration", hint=KINDS)
     note = f"intrinsics read from {path.name}"
     if path.suffix in (".yaml", ".yml"):
         calibration = _from_document(_read_yaml(path), path)
@@ -76,7 +77,7 @@ def _read_yaml(path: Path) -> Any:
         return parser.load(text)
     except (YAMLError, ValueError, RecursionError, TypeError, AttributeError, KeyError, IndexError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise BadInput(f"{path}: no YAML ({reason})"[:300]) from None
+        raise BadInput(f"{path}: no YAML ({reason})"[:300], hint=KINDS) from None
 
 
 def pair_of_files(left: Path, right: Path) -> FolderCalibration:
@@ -88,7 +89,10 @@ def pair_of_files(left: Path, right: Path) -> FolderCalibration:
         # EuRoC: T_BS is body_from_sensor.
         bodies = [_matrix(_first(document, "T_BS"), 4, 4) for document in documents]
         if any(body is None or not is_rigid(body) for body in bodies):
-            raise BadInput(f"{right}: has neither a projection matrix nor T_BS, so no extrinsics of the two cameras")
+            raise BadInput(
+                f"{right}: has neither a projection matrix nor T_BS, so no extrinsics of the two cameras",
+                hint="add T_BS, body from sensor, to both files",
+            )
         assert bodies[0] is not None and bodies[1] is not None
         left_from_right = inverse(bodies[0]) @ bodies[1]
     notes = (f"intrinsics read from {left.name} and {right.name}",) if left.name != right.name else first.notes
@@ -100,7 +104,7 @@ def pair_of_files(left: Path, right: Path) -> FolderCalibration:
 
 def _from_document(document: Any, path: Path) -> FolderCalibration:
     if not isinstance(document, dict):
-        raise BadInput(f"{path}: has no camera")
+        raise BadInput(f"{path}: has no camera", hint=KINDS)
     if isinstance(document.get("cam0"), dict):
         return _kalibr(document, path)
     units = stated_depth_units(document, str(path))
@@ -127,10 +131,7 @@ def _camera_of(document: dict[Any, Any], path: Path) -> CalibrationRecord:
         values = [_first(document, *names) for names in pairs]
         numbers = _numbers(values)
         if numbers is None:
-            raise BadInput(
-                f"{path}: has neither a camera matrix nor fx, fy, cx, cy",
-                hint="docs/FORMATS.md, Layouts of logs, lists the files",
-            )
+            raise BadInput(f"{path}: has neither a camera matrix nor fx, fy, cx, cy", hint=KINDS)
         matrix = _pinhole_matrix(numbers)
     coefficients = _numbers(
         _first(document, "distortion_coefficients", "distortion_coeffs", "dist_coeffs", "distortion", "D", "dist")
@@ -160,7 +161,7 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
     for name, number in ((first, "1"), (second, "2")):
         matrix = _matrix(document[name], 3, 3)
         if matrix is None:
-            raise BadInput(f"{path}: {name} is not a 3x3 matrix")
+            raise BadInput(f"{path}: {name} is not a 3x3 matrix", hint="write nine numbers, row by row")
         coefficients = _numbers(_first(document, f"D{number}", f"distCoeffs{number}")) or ()
         records.append(_record(matrix, size, path, coefficients, "plumb_bob"))
     notes: tuple[str, ...] = ()
@@ -191,7 +192,7 @@ def _kalibr(document: dict[Any, Any], path: Path) -> FolderCalibration:
         return FolderCalibration(first)
     right_from_left = _matrix(second.get("T_cn_cnm1"), 4, 4)
     if right_from_left is None or not is_rigid(right_from_left):
-        raise BadInput(f"{path}: cam1 has no rigid T_cn_cnm1")
+        raise BadInput(f"{path}: cam1 has no rigid T_cn_cnm1", hint="write that 4x4 matrix, as Kalibr does")
     return FolderCalibration(first, _camera_of(second, path), inverse(right_from_left))
 
 
@@ -233,7 +234,7 @@ def _size(document: dict[Any, Any], path: Path) -> tuple[int, int]:
 
 def _check_size(numbers: Sequence[float], path: Path) -> tuple[int, int]:
     if len(numbers) != 2 or not all(0 <= value <= 100_000 for value in numbers):
-        raise BadInput(f"{path}: image size {list(numbers)} is impossible")
+        raise BadInput(f"{path}: image size {list(numbers)} is impossible", hint="write width and height in pixels")
     return round(numbers[0]), round(numbers[1])
 
 
@@ -251,15 +252,15 @@ def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     try:
         numbers = [float(field) for field in re.sub(r"#.*", "", text).replace(",", " ").split()]
     except ValueError:
-        raise BadInput(
-            f"{path}: is no calibration that is understood", hint="docs/FORMATS.md, Layouts of logs, lists the kinds"
-        ) from None
+        raise BadInput(f"{path}: is no calibration that is understood", hint=KINDS) from None
     if len(numbers) in (4, 8, 9) and not (len(numbers) == 9 and numbers[6:] == [0, 0, 1]):
         return FolderCalibration(_record(_pinhole_matrix(numbers[:4]), (0, 0), path, numbers[4:], "plumb_bob"))
     if len(numbers) in (9, 16):
         edge = math.isqrt(len(numbers))
         return FolderCalibration(_record(np.array(numbers).reshape(edge, edge)[:3, :3], (0, 0), path))
-    raise BadInput(f"{path}: {len(numbers)} numbers, expected fx fy cx cy [distortion], 3x3 or 4x4")
+    raise BadInput(
+        f"{path}: {len(numbers)} numbers, expected fx fy cx cy [distortion], 3x3 or 4x4", hint="write one of these"
+    )
 
 
 def split_lines(text: str) -> dict[str, str]:
@@ -285,9 +286,14 @@ def _kitti(text: str, path: Path, camera_number: int) -> FolderCalibration:
         try:
             projections[int(match[1])] = [float(field) for field in match[2].split()]
         except ValueError:
-            raise BadInput(f"{path}: P{match[1]} holds a value that is not a number") from None
+            raise BadInput(
+                f"{path}: P{match[1]} holds a value that is not a number", hint="write twelve numbers"
+            ) from None
     if camera_number not in projections:
-        raise BadInput(f"{path}: has no P{camera_number}")
+        raise BadInput(
+            f"{path}: has no P{camera_number}",
+            hint=f"it has {', '.join(f'P{number}' for number in sorted(projections))}",
+        )
     records = {}
     for number, values in projections.items():
         matrix = np.array(values).reshape(3, 4)
@@ -296,7 +302,10 @@ def _kitti(text: str, path: Path, camera_number: int) -> FolderCalibration:
     try:
         offset = np.linalg.solve(np.array(left.K).reshape(3, 3), np.array(left.P).reshape(3, 4)[:, 3])
     except np.linalg.LinAlgError:
-        raise BadInput(f"{path}: the camera matrix of P{camera_number} cannot be inverted") from None
+        raise BadInput(
+            f"{path}: the camera matrix of P{camera_number} cannot be inverted",
+            hint="write it row by row: fx 0 cx, 0 fy cy, 0 0 1",
+        ) from None
     posed_from_left = transform_from(np.eye(3), -offset)
     return FolderCalibration(left, records.get(camera_number + 1), None, True, posed_from_left)
 
@@ -311,14 +320,17 @@ def _middlebury(keyed: dict[str, str], path: Path) -> FolderCalibration:
         except ValueError:
             values = []
         if len(values) != count or not np.isfinite(values).all():
-            raise BadInput(f"{path}: {key} is missing or has not {count} numbers")
+            raise BadInput(f"{path}: {key} is missing or has not {count} numbers", hint=KINDS)
         return values
 
     first, second = (np.array(numbers(name, 9)).reshape(3, 3) for name in ("cam0", "cam1"))
     baseline = numbers("baseline", 1)[0] / 1000
     offset = numbers("doffs", 1)[0] if "doffs" in keyed else float(second[0, 2] - first[0, 2])
     if abs(second[0, 2] - first[0, 2] - offset) > 0.5:
-        raise BadInput(f"{path}: doffs {offset:g} is not the difference of the principal points in cam0 and cam1")
+        raise BadInput(
+            f"{path}: doffs {offset:g} is not the difference of the principal points in cam0 and cam1",
+            hint="correct doffs: cx of cam1 minus cx of cam0",
+        )
     size = _check_size([numbers(key, 1)[0] for key in ("width", "height")], path) if "width" in keyed else (0, 0)
     # The difference of the principal points is doffs to the digits printed; disparities are stated against doffs.
     second[0, 2] = first[0, 2] + offset
@@ -349,7 +361,10 @@ def _record(
     numbers = [float(value) for value in matrix.reshape(-1)]
     every = [*values, *numbers, *rotation, *projection]
     if not np.isfinite(every).all() or numbers[0] <= 0 or numbers[4] <= 0:
-        raise BadInput(f"{path}: focal lengths {numbers[0]:g}, {numbers[4]:g} are no camera, or numbers are not finite")
+        raise BadInput(
+            f"{path}: focal lengths {numbers[0]:g}, {numbers[4]:g} are no camera, or numbers are not finite",
+            hint="write fx and fy in pixels, over 0",
+        )
     if abs(numbers[1]) > 1e-3 * numbers[0]:
         raise BadInput(
             f"{path}: the camera matrix is skewed by {numbers[1]:g} pixels", hint="row by row: fx 0 cx, 0 fy cy"

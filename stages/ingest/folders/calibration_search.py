@@ -78,5 +78,5 @@ def refuse_several(root: Path) -> None:
         names = ", ".join(path.name for path in several)
         raise BadInput(
             f"{root}: {names} hold a camera each, and none is named like a calibration",
-            hint=f"name the one of these pictures calibration{several[0].suffix}",
+            hint=f"name the one of these images calibration{several[0].suffix}",
         )

@@ -67,7 +67,7 @@ def images_by_number(folder: Path, suffixes: tuple[str, ...], prefix: str = "") 
     for path in (path for path in files_of(folder, suffixes) if path.name.startswith(prefix)):
         numbers = re.findall(r"\d+", path.stem)
         if not numbers:
-            raise BadInput(f"{path}: has no frame number in its name")
+            raise BadInput(f"{path}: has no frame number in its name", hint="number it, or take it out of the folder")
         number = int(numbers[-1])
         if number in images:
             raise BadInput(f"{path}: {images[number].name} has the same frame number", hint="keep one of the two")
@@ -93,7 +93,7 @@ def named_file(root: Path, name: Any, where: str) -> Path:
     system, or over a link.
     """
     if not isinstance(name, str) or not name.strip() or "\0" in name or len(name) > 4096:
-        raise BadInput(f"{where}: {name!r:.60} is not a file name")
+        raise BadInput(f"{where}: {name!r:.60} is not a file name", hint="name a file of the log")
     if "\\" in name and not (root / name).exists():
         name = name.replace("\\", "/")
     path = root / name
@@ -110,7 +110,7 @@ def named_file(root: Path, name: Any, where: str) -> Path:
 
 def read_json(path: Path) -> Any:
     """Return the document in a JSON file. Raises BadInput."""
-    return json_of(read_text(path), str(path))
+    return json_of(read_text(path), str(path), hint="correct it, or copy it again")
 
 
 def file_bytes(path: Path, stream: str) -> bytes:

@@ -75,7 +75,7 @@ def kept_pictures(colors: Iterable[Path | None], camera: Camera) -> Size | None:
 def picture_camera(camera: Camera, size: Size | None) -> Camera | None:
     """Return the camera of frames at the size of their larger pictures, None where these are none. Raises BadInput for
     another shape."""
-    return None if size is None else resized_camera(camera, size, "pictures")
+    return None if size is None else resized_camera(camera, size, "images")
 
 
 def frame_loader(files: FrameFiles, form: FrameFormat) -> Callable[[], LoadedFrame]:
@@ -126,7 +126,7 @@ def _color_and_picture(
         return _color(data, form.recorded, form.camera, "color"), None
     full = picture_camera(form.camera, form.picture_size)
     assert full is not None
-    recorded = form.recorded.at(form.picture_size, "pictures")
+    recorded = form.recorded.at(form.picture_size, "images")
     image = _decoded(data, recorded, "color")
     if isinstance(data, bytes) and recorded.lens.is_pinhole and recorded.camera == full and is_kept(data, image, full):
         return fitted_color(image, form.camera), data

@@ -88,7 +88,7 @@ def phone_source(name: str, rule: str, log: PhoneLog, parameters: IngestParamete
     kinds = {tuple(frame.intrinsics): _recorded(frame.intrinsics, log, size, parameters) for frame in log.frames}
     recorded = [kinds[tuple(frame.intrinsics)] for frame in log.frames]
     if not recorded:
-        raise BadInput(f"{log.where}: has no frames")
+        raise BadInput(f"{log.where}: has no frames", hint="export the recording from the app again")
     cameras = [each.camera for each in recorded]
     camera = cameras[0] if len(set(cameras)) == 1 else median_camera(cameras)
     form, unit_note = depth_form(parameters, log.units_per_metre)
@@ -111,9 +111,9 @@ def phone_source(name: str, rule: str, log: PhoneLog, parameters: IngestParamete
     if len(set(cameras)) > 1:
         notes.append(f"{len(set(cameras))} different intrinsics: images are resampled to the median ones")
     if kept is not None:
-        notes.append(f"colour brought to the depth's {size_words(size)}; pictures of {size_words(kept)} are kept")
+        notes.append(f"colour brought to the depth's {size_words(size)}; images of {size_words(kept)} are kept")
     if turns:
-        notes.append(f"pictures and depth turned {WORDS[turns]}, so that they stand upright (--no-turn leaves them)")
+        notes.append(f"images and depth turned {WORDS[turns]}, so that they stand upright (--no-turn leaves them)")
     with_levels = sum(frame.reads.levels is not None for frame in log.frames)
     if has_depth:
         notes.append(unit_note)
@@ -216,7 +216,7 @@ def _levels_note(count: int, frames: int) -> str:
 
 def _check_shapes(log: PhoneLog) -> None:
     """A phone turns pictures, depth and intrinsics together; whoever converts one of them alone turns it alone."""
-    for what, size in (("pictures", log.picture_size), ("depth", log.depth_size)):
+    for what, size in (("images", log.picture_size), ("depth", log.depth_size)):
         if size is None or same_shape(size, log.full_size):
             continue
         words = f"{log.where}: {what} of {size_words(size)} do not have the shape of {size_words(log.full_size)}"
@@ -227,5 +227,5 @@ def _check_shapes(log: PhoneLog) -> None:
             )
         raise BadInput(
             f"{words}, of which the intrinsics are, and nothing says what was cut off",
-            hint="record with the app's 4:3 setting, in which depth and pictures are of one shape",
+            hint="record with the app's 4:3 setting, in which depth and images are of one shape",
         )

@@ -51,7 +51,7 @@ def columns_of(path: Path) -> int:
 
 
 def _first_row(path: Path) -> list[str]:
-    with opened(path) as file:
+    with opened(path, hint="check its permissions") as file:
         start = file.read(4096).decode("utf-8", "replace")
     rows = (line.split("#", 1)[0].split() for line in start.splitlines())
     return next((row for row in rows if row), [])

@@ -60,7 +60,7 @@ def coverage_notes(
     elif any(posed):
         notes.append(f"{counted}: {spans_text(times, stamps)}")
     elif not stamps[0] <= times.max() or not times.min() <= stamps[-1]:
-        notes.append("write the stamps of the poses in the clock of the pictures")
+        notes.append("write the stamps of the poses in the clock of the images")
     return tuple(notes)
 
 

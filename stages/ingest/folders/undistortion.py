@@ -59,7 +59,9 @@ class RecordedCamera:
 def recorded_camera(record: CalibrationRecord, size: tuple[int, int] | None, where: str) -> RecordedCamera:
     """Return the camera of a calibration for images of `size` (width, height). Raises BadInput for another shape."""
     fx, _, cx, _, fy, cy, *_ = record.K
-    camera = Camera.of_outside(where, width=record.width, height=record.height, fx=fx, fy=fy, cx=cx, cy=cy)
+    camera = Camera.of_outside(
+        where, width=record.width, height=record.height, fx=fx, fy=fy, cx=cx, cy=cy, hint="correct the calibration"
+    )
     lens = lens_of(record.D, where, fisheye=record.distortion_model in FISHEYE_MODELS)
     return RecordedCamera(camera, lens).at(size, where)
 
@@ -68,16 +70,23 @@ def lens_of(coefficients: list[float] | tuple[float, ...], where: str, *, fishey
     """Return the lens of OpenCV coefficients (4, 5 or 8; fisheye 4). Raises BadInput for what is none."""
     values = tuple(float(value) for value in coefficients)
     if not all(map(math.isfinite, values)):
-        raise BadInput(f"{where}: distortion coefficients {list(values)} are not finite")
+        raise BadInput(
+            f"{where}: distortion coefficients {list(values)} are not finite", hint="correct the calibration"
+        )
     if fisheye:
         if len(values) > 4:
-            raise BadInput(f"{where}: {len(values)} fisheye coefficients, expected 4")
+            raise BadInput(
+                f"{where}: {len(values)} fisheye coefficients, expected 4", hint="calibrate with OpenCV's fisheye model"
+            )
         return Lens("fisheye", values + (0.0,) * (4 - len(values)))
     while values and abs(values[-1]) <= NEGLIGIBLE:  # files pad with zeros
         values = values[:-1]
     count = next((count for count in (0, 4, 5, 8) if len(values) <= count), None)
     if count is None:
-        raise BadInput(f"{where}: {len(values)} distortion coefficients, at most 8 are understood")
+        raise BadInput(
+            f"{where}: {len(values)} distortion coefficients, at most 8 are understood",
+            hint="undistort the images first, or calibrate with fewer",
+        )
     return Lens("opencv", values + (0.0,) * (count - len(values)))
 
 

@@ -40,7 +40,9 @@ class VideoFrames:
         self.size = (round(width), round(height))
         """(width, height) of the frames."""
         if not 0 < width * height <= LARGEST_IMAGE:
-            raise BadInput(f"{path}: declares frames of {width:g}x{height:g} pixels")
+            raise BadInput(
+                f"{path}: declares frames of {width:g}x{height:g} pixels", hint="export its frames as images"
+            )
         self.count = self._count_frames()
 
     @property
@@ -91,7 +93,7 @@ class VideoFrames:
 
 def is_hdr(path: Path) -> bool:
     """Whether a video says that its values are those of PQ or HLG, which OpenCV reads as if they were usual ones."""
-    with opened(path) as file:
+    with opened(path, hint="check its permissions") as file:
         data = file.read(SEARCHED)
         file.seek(max(0, os.fstat(file.fileno()).st_size - SEARCHED))
         data += file.read(SEARCHED)

@@ -24,10 +24,10 @@ class LogFile:
         try:
             if not path.is_file():
                 fault = "is a folder" if path.is_dir() else "is not a file" if path.exists() else "file is missing"
-                raise BadInput(f"{path}: {fault}, expected {kind}")
+                raise BadInput(f"{path}: {fault}, expected {kind}", hint="give such a file")
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         except OSError as error:
-            raise BadInput(f"{path}: cannot be opened: {error.strerror}") from None
+            raise BadInput(f"{path}: cannot be opened: {error.strerror}", hint="check its permissions") from None
         self.size = os.fstat(self._descriptor).st_size
 
     def close(self) -> None:

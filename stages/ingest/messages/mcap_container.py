@@ -8,6 +8,7 @@ from pathlib import Path
 
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.messages.container import Channel, StoredMessage
+from scenewright.stages.ingest.messages.damage_lines import HINT
 from scenewright.stages.ingest.messages.mcap_log import Location, LogMessage, McapLog
 
 
@@ -61,7 +62,7 @@ class McapMessages:
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         if not isinstance(location, Location):
-            raise BadInput(f"{self.path}: {location!r} is not a place in an MCAP file")
+            raise BadInput(f"{self.path}: {location!r} is not a place in an MCAP file", hint=HINT)
         return self._as_stored(self._log.fetch(location))
 
     def close(self) -> None:

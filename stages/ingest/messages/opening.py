@@ -48,7 +48,7 @@ def open_message_log(path: Path, *, salvage: bool) -> MessageLog:
 def _file_container(path: Path) -> str | None:
     if not path.is_file():
         return None
-    with opened(path) as file:
+    with opened(path, hint="check its permissions") as file:
         head = file.read(len(SQLITE_MAGIC))
     if head.startswith(MCAP_MAGIC):
         return "mcap"
@@ -62,7 +62,7 @@ def _file_container(path: Path) -> str | None:
 def _folder_container(path: Path) -> str | None:
     metadata = path / NAME
     if metadata.is_file():
-        with opened(metadata) as file:
+        with opened(metadata, hint="check its permissions") as file:
             if KEY.encode() in file.read(_METADATA_HEAD):
                 return "rosbag2"
     if any(entry.is_dir() for entry in path.iterdir()):

@@ -102,7 +102,7 @@ class Rosbag1Messages:
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         if not isinstance(location, Place) or not 0 <= location.chunk < len(self._chunks):
-            raise BadInput(f"{self.path}: {location!r} is not a place in a ROS 1 bag")
+            raise BadInput(f"{self.path}: {location!r} is not a place in a ROS 1 bag", hint=HINT)
         try:
             data = self._cache.get(location.chunk, self._unpack)
             record = record_within(data, location.offset)

@@ -45,7 +45,7 @@ def read_bag_metadata(folder: Path) -> BagMetadata:
     """Return what metadata.yaml says. Raises BadInput when it is missing, damaged, or leads out of the folder."""
     path = folder / NAME
     try:
-        tree = _tree(file_text(path, LARGEST))
+        tree = _tree(file_text(path, LARGEST, hint="`ros2 bag reindex` writes it anew"))
         if not isinstance(tree, dict) or not isinstance(tree.get(KEY), dict):
             raise ValueError("it does not describe a bag")
         return _metadata_of(folder, tree[KEY])
@@ -112,7 +112,10 @@ def _inside(folder: Path, name: str) -> Path:
     if not path.exists() and len(PurePosixPath(name).parts) == 2 and ".." not in PurePosixPath(name).parts:
         path = folder / PurePosixPath(name).name
     if not path.resolve().is_relative_to(folder.resolve()):
-        raise BadInput(f"{folder / NAME}: names the part {name!r:.100}, which is outside of the folder")
+        raise BadInput(
+            f"{folder / NAME}: names the part {name!r:.100}, which is outside of the folder",
+            hint="put that part beside it and name it without a folder",
+        )
     return path
 
 

@@ -102,7 +102,7 @@ class SqliteMessages:
         except (*_FAULTS, OverflowError) as error:
             raise BadInput(f"{self.path}: message {location!r} cannot be read: {_reason(error)}", hint=HINT) from None
         if not rows or rows[0][1] not in self._topics or not _is_message(*rows[0][2:]):
-            raise BadInput(f"{self.path}: {location!r} is not a place in the bag")
+            raise BadInput(f"{self.path}: {location!r} is not a place in the bag", hint=HINT)
         _, topic, time, data = rows[0]
         return StoredMessage(self._topics[topic], time, data, location)
 
@@ -114,7 +114,7 @@ class SqliteMessages:
         try:
             head = file.read(0, _HEAD_SIZE)
         except Damaged as fault:
-            raise BadInput(f"{self.path}: {fault}") from None
+            raise BadInput(f"{self.path}: {fault}", hint=HINT) from None
         finally:
             file.close()
         if not head.startswith(MAGIC):
@@ -194,7 +194,10 @@ class SqliteMessages:
     def _open(self) -> None:
         tables = self._tables()
         if not {"topics", "messages"} <= tables:
-            raise BadInput(f"{self.path}: is a database without the tables of a bag (topics, messages)")
+            raise BadInput(
+                f"{self.path}: is a database without the tables of a bag (topics, messages)",
+                hint="give a bag that `ros2 bag record` wrote",
+            )
         sound = self._check_structure()
         definitions = self._definitions() if "message_definitions" in tables else {}
         counts = self._counts() if sound else None

@@ -106,7 +106,11 @@ def depth_findings(report: DepthReport, units: float, camera: str, *, has_poses:
             f"ingest with --depth-scale {MULTIPLE * 1000}, where that is so",
         )
     if report.valid_share < LITTLE_VALID:
-        add("doubtful", f"only {100 * report.valid_share:.1f} % of the depth pixels are valid")
+        add(
+            "doubtful",
+            f"only {100 * report.valid_share:.1f} % of the depth pixels are valid",
+            "come nearer; glass and sunlight give none",
+        )
     if report.saturated_share > SATURATED:
         add(
             "doubtful",

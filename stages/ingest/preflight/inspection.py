@@ -353,7 +353,7 @@ def _gravity(
             continue
         poses, best = material.poses, material.outcome.best
         if report.poses.verdict == "contradict" and not report.poses.decisive:
-            return GravityReport(method="none", detail="not tried: the poses contradict the pictures")
+            return GravityReport(method="none", detail="not tried: the poses contradict the images")
         if report.poses.decisive and best is not None:
             poses = converted(poses, best.convention, best.scale)
             untouched &= best.convention == "as-is"
@@ -452,12 +452,12 @@ def _content_findings(reports: list[CameraReport], source: LogSource) -> list[Fi
     if "depth" not in streams and not stereo:
         advice = "record depth; colour alone can only be looked at"
         if "pose" in streams and "color" in streams:
-            advice = "record depth; of pictures with poses a splat can be learned: ingest, then scenewright splat build"
+            advice = "record depth; of images with poses a splat can be learned: ingest, then scenewright splat build"
         add("wasted", "depth", f"there is no depth and no stereo pair with a baseline{why('depth')}", advice)
     elif "depth" not in streams:
         add("doubtful", "depth", "there is no depth, but a stereo pair", "make depth with the step disparity")
     if "color" not in streams:
-        add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes")
+        add("doubtful", "pictures", "there is no colour: nothing can be recognised, only shapes", "record colour too")
     if "pose" not in streams:
         advice = "run reconstruct-without-poses, which estimates them, or give ingest or fuse your own --trajectory"
         add("doubtful", "poses", f"the frames have no poses, which fuse needs{why('pose')}", advice)

@@ -93,5 +93,9 @@ def motion_findings(report: MotionReport, poses_agree: bool, camera: str) -> lis
             "the tracker was slower than the camera, or stood still: use --every, or other poses",
         )
     if poses_agree and report.overlap is not None and report.overlap < LITTLE_OVERLAP:
-        add("doubtful", f"neighbouring frames share only {100 * report.overlap:.0f} % of what they see")
+        add(
+            "doubtful",
+            f"neighbouring frames share only {100 * report.overlap:.0f} % of what they see",
+            "move more slowly, or record more images a second",
+        )
     return findings

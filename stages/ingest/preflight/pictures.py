@@ -70,13 +70,13 @@ def picture_findings(report: PictureReport, camera: str) -> list[Finding]:
         findings.append(Finding(severity="doubtful", check="pictures", message=message, fix=fix, camera=camera))
 
     if report.blurred_share > 0.3:
-        add(f"{100 * report.blurred_share:.0f} % of the pictures are blurred or show nothing", "use --every, or rescan")
+        add(f"{100 * report.blurred_share:.0f} % of the images are blurred or show nothing", "use --every, or rescan")
     if report.brightness < 20 or report.dark_share > 0.5:
-        add(f"pictures are dark: mean brightness {report.brightness:.0f} of 255")
+        add(f"images are dark: mean brightness {report.brightness:.0f} of 255", "record in more light")
     if report.bright_share > 0.4:
-        add(f"pictures are overexposed: {100 * report.bright_share:.0f} % of the pixels are white")
+        add(f"images are overexposed: {100 * report.bright_share:.0f} % of the pixels are white", "lower the exposure")
     if report.flicker > 0.1:
-        add(f"brightness flickers by {100 * report.flicker:.0f} % between neighbours")
+        add(f"brightness flickers by {100 * report.flicker:.0f} % between neighbours", "fix the exposure")
     if report.repeated_share > 0.3:
-        add(f"{100 * report.repeated_share:.0f} % of the pictures are the same as the one before")
+        add(f"{100 * report.repeated_share:.0f} % of the images are the same as the one before", "record each once")
     return findings

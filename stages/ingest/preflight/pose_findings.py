@@ -57,6 +57,7 @@ def pose_findings(
             add(
                 "doubtful",
                 f"{report.bad_pairs} of {report.pairs} pairs of frames disagree with their poses, at {places} s",
+                "leave those times out",
             )
     elif best is not None and report.decisive:
         agree = f"they agree ({measure.words(best.residual)})"

@@ -175,7 +175,7 @@ def _words(score: float, lag: float | None, decisive: bool, shifted: bool, regis
     elif lag is None:
         phrases.append("too little motion to compare clocks")
     if shifted:
-        phrases.append("better elsewhere in the picture")
+        phrases.append("better elsewhere in the image")
     if not registered:
         phrases.append("the log does not register them")
     return ", ".join(phrases)

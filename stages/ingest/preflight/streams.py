@@ -132,15 +132,15 @@ def stream_findings(streams: Iterable[StreamReport], notes: Iterable[str] = ()) 
             continue
         is_of_images, rate = stream.role in ("color", "depth", "right"), stream.rate or 0.0
         if is_of_images and stream.count > 2 and 0 < rate < 1 / USUAL_STEP:
-            message = (
-                f"{stream.name}: pictures are {1 / rate:.3g} s apart: are the stamps of another unit than seconds?"
-            )
+            message = f"{stream.name}: images are {1 / rate:.3g} s apart: are the stamps of another unit than seconds?"
             advice = "write them in seconds, where they are"
             findings.append(Finding(severity="doubtful", check="streams", message=message, fix=advice))
         if is_of_images and rate > FASTEST:
             if not told:
-                message = f"{stream.name}: stamps make {rate:,.0f} pictures a second, {NO_RATE}"
-                findings.append(Finding(severity="doubtful", check="streams", message=message))
+                message = f"{stream.name}: stamps make {rate:,.0f} images a second, {NO_RATE}"
+                findings.append(
+                    Finding(severity="doubtful", check="streams", message=message, fix="correct the stamps")
+                )
         elif stream.gaps.count and (
             stream.gaps.longest > LONG_GAP or stream.gaps.count > MANY_GAPS * max(stream.count - 1, 1) + 1
         ):
@@ -150,6 +150,7 @@ def stream_findings(streams: Iterable[StreamReport], notes: Iterable[str] = ()) 
                     check="streams",
                     message=f"{stream.name}: {stream.gaps.count} gaps, the longest {stream.gaps.longest:.3g} s at "
                     f"{stream.gaps.longest_at:.3f} s",
+                    fix="record fewer topics at a time, or to a faster disk",
                 )
             )
         if stream.duplicates:

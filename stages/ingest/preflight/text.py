@@ -130,7 +130,7 @@ def _camera_lines(report: CameraReport) -> Iterator[str]:
     pictures = report.pictures
     if pictures is not None:
         yield _row(
-            "pictures",
+            "images",
             f"sharpness {pictures.sharpness_median:.3g}, {100 * pictures.blurred_share:.0f} % blurred, brightness "
             f"{pictures.brightness:.0f}/255, {100 * pictures.dark_share:.0f} % black, "
             f"{100 * pictures.bright_share:.0f} % white, flicker {100 * pictures.flicker:.1f} %",

@@ -17,8 +17,8 @@ from math import atan2, pi
 
 import numpy as np
 from pydantic import TypeAdapter
-from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
-from scenewright.schemas.places import data_file
+from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import REINSTALL, data_file
 
 RATES_NAME = "errors/segmenters.toml"
 RATES_FILE = data_file(RATES_NAME)
@@ -98,7 +98,7 @@ class SegmenterRates:
 def segmenter_rates(segmenter: str) -> SegmenterRates:
     """Return the rates of a segmenter in data/errors/segmenters.toml. Raises KeyError for one that is not there, and
     BadInput or ValidationError for a file that is damaged."""
-    told = TypeAdapter(dict[str, SegmenterRates]).validate_python(file_toml(RATES_FILE, LARGEST_SETTINGS))[segmenter]
+    told = TypeAdapter(dict[str, SegmenterRates]).validate_python(file_toml(RATES_FILE, hint=REINSTALL))[segmenter]
     merged, split = told.merged / (1 - told.missed), told.split / (1 - told.missed - told.merged)
     return replace(told, merged=merged, split=split)
 

@@ -15,6 +15,8 @@ RELATION_COLORS = {
 }
 UNLABELLED = (0.46, 0.45, 0.44)
 """Colour of what has no class (sRGB, 0 to 1)."""
+UNEXPLAINED_COLOR = (0.90, 0.29, 0.10)
+"""Colour of mapped surface that nothing in a scene lies near to."""
 LAYOUT_COLORS = {"floor": (0.80, 0.755, 0.69), "wall": (0.715, 0.755, 0.785), "ceiling": (0.84, 0.84, 0.82)}
 """Calm colours for what is large and behind everything."""
 GOLDEN_RATIO = 0.6180339887498949

@@ -64,7 +64,10 @@ def part_transforms(model: CadModel, joints: dict[str, float]) -> dict[str, np.n
     """
     unknown = set(joints) - {joint.name for joint in model.joints}
     if unknown:
-        raise BadInput(f"model {model.id}: no joint {sorted(unknown)[0]!r}")
+        raise BadInput(
+            f"model {model.id}: no joint {sorted(unknown)[0]!r}",
+            hint=f"it has: {', '.join(joint.name for joint in model.joints) or 'none'}",
+        )
     part_poses, origins, parents = {}, {}, {}
     for joint in model.joints:
         value = joints.get(joint.name, 0.0)
@@ -101,7 +104,7 @@ def load_collision_parts(folder: Path) -> dict[str, list[trimesh.Trimesh]]:
     for file in (Path(folder) / "collision").glob("*.obj"):
         match = re.fullmatch(r"(.+)_(\d+)", file.stem)
         if match is None:
-            raise BadInput(f"{file}: not named <part>_<number>.obj")
+            raise BadInput(f"{file}: not named <part>_<number>.obj", hint=REBUILD)
         numbered.setdefault(match[1], []).append((int(match[2]), file))
     if not numbered:
         raise BadInput(f"{folder}: no collision/<part>_<number>.obj", hint=REBUILD)

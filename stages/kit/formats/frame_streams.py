@@ -36,9 +36,13 @@ PIXEL_STREAMS = ("color", "depth", "labels", "right", "deviation", "picture")
 def camera_of(message: Any, path: Path) -> Camera:
     """Return the pinhole camera of a CameraCalibration. Raises BadInput, naming `path`, without focal lengths."""
     if len(message.K) != 9 or message.K[0] <= 0 or message.K[4] <= 0:
-        raise BadInput(f"{path}: calibration has no focal lengths (K = {list(message.K)})")
+        raise BadInput(
+            f"{path}: calibration has no focal lengths (K = {list(message.K)})", hint="make the artifact again"
+        )
     fx, _, cx, _, fy, cy, *_ = message.K
-    return Camera.of_outside(path, width=message.width, height=message.height, fx=fx, fy=fy, cx=cx, cy=cy)
+    return Camera.of_outside(
+        path, width=message.width, height=message.height, fx=fx, fy=fy, cx=cx, cy=cy, hint="make the artifact again"
+    )
 
 
 def label_table(table: dict[str, str], path: Path) -> tuple[LabelEntry, ...]:
@@ -47,5 +51,6 @@ def label_table(table: dict[str, str], path: Path) -> tuple[LabelEntry, ...]:
         return tuple(LabelEntry(instance=int(key), class_name=table[key]) for key in sorted(table, key=int))
     except ValueError:
         raise BadInput(
-            f"{path}: metadata record {LABELS_METADATA!r} has a key that is not an instance number"
+            f"{path}: metadata record {LABELS_METADATA!r} has a key that is not an instance number",
+            hint="make the artifact again",
         ) from None

@@ -42,7 +42,7 @@ from scenewright.stages.kit.formats.frame_streams import (
     camera_of,
     label_table,
 )
-from scenewright.stages.kit.formats.indexed_mcap import IndexedMcap, Location
+from scenewright.stages.kit.formats.indexed_mcap import HINT, IndexedMcap, Location
 from scenewright.stages.kit.geometry.transforms import is_rigid
 
 
@@ -291,7 +291,7 @@ class FrameReader:
         if self._cameras is None:
             cameras = self._calibrated("calibration")
             if not cameras:
-                raise BadInput(f"{self.path}: holds no camera calibration")
+                raise BadInput(f"{self.path}: holds no camera calibration", hint=HINT)
             self._cameras = cameras
         return self._cameras
 
@@ -323,7 +323,7 @@ class FrameReader:
                 if name not in self._baselines and "right_calibration" in places:
                     message = self._decode("right_calibration", places["right_calibration"])
                     if len(message.P) != 12 or not message.P[0] > 0:
-                        raise BadInput(f"{self.path}: calibration of the right eye has no projection matrix")
+                        raise BadInput(f"{self.path}: calibration of the right eye has no projection matrix", hint=HINT)
                     self._baselines[name] = -message.P[3] / message.P[0]
         return self._baselines
 
@@ -357,11 +357,11 @@ class FrameReader:
         if "pose" in places:
             transforms = self._decode("pose", places["pose"]).transforms
             if not transforms:
-                raise BadInput(f"{self.path}: frame {index} has an empty list of transforms")
+                raise BadInput(f"{self.path}: frame {index} has an empty list of transforms", hint=HINT)
             try:
                 pose = foxglove.transform_matrix(transforms[0].translation, transforms[0].rotation)
             except ValueError as error:
-                raise BadInput(f"{self.path}: pose of frame {index}: {error}") from None
+                raise BadInput(f"{self.path}: pose of frame {index}: {error}", hint=HINT) from None
         return Frame(index, stamp * 1e-9, **arrays, world_from_camera=pose, camera_name=name)
 
     def encoded(self, index: int, stream: Literal["color", "right", "picture"] = "color") -> bytes | None:
@@ -386,7 +386,7 @@ class FrameReader:
                 return foxglove.steps_to_deviation(pixels)
             return pixels.astype(np.uint16, copy=False)
         except ValueError as error:
-            raise BadInput(f"{self.path}: {stream} of frame {index}: {error}") from None
+            raise BadInput(f"{self.path}: {stream} of frame {index}: {error}", hint=HINT) from None
 
     def _find_topics(self) -> dict[int, tuple[str, str]]:
         """Return channel -> (camera, stream); the camera of `/tf` is empty."""
@@ -423,7 +423,7 @@ class FrameReader:
             kind = FrameTransforms if stream == "pose" else MESSAGE_TYPES[stream]
             return kind.FromString(self._log.fetch(location))
         except DecodeError:
-            raise BadInput(f"{self.path}: a message of stream {stream} cannot be decoded") from None
+            raise BadInput(f"{self.path}: a message of stream {stream} cannot be decoded", hint=HINT) from None
 
 
 def require_depth(sequence: Sequence) -> None:

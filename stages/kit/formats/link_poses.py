@@ -21,14 +21,20 @@ def link_poses(urdf: Urdf, values: dict[str, float]) -> dict[str, np.ndarray]:
         parent = waiting.pop()
         for joint in children.get(parent, []):
             if joint.child in poses:
-                raise BadInput(f"{urdf.name}: link {joint.child!r} has two parents")
+                raise BadInput(
+                    f"{urdf.name}: link {joint.child!r} has two parents",
+                    hint="give each link but one a parent joint, and one alone",
+                )
             poses[joint.child] = (
                 poses[parent] @ joint.parent_from_child @ joint_motion(joint, values.get(joint.name, 0.0))
             )
             waiting.append(joint.child)
     missing = {link.name for link in urdf.links} - poses.keys()
     if missing:
-        raise BadInput(f"{urdf.name}: link {sorted(missing)[0]!r} hangs on nothing")
+        raise BadInput(
+            f"{urdf.name}: link {sorted(missing)[0]!r} hangs on nothing",
+            hint="give each link but one a parent joint, and one alone",
+        )
     return poses
 
 

@@ -11,11 +11,12 @@ from scenewright.stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoin
 from scenewright.stages.kit.geometry.substances import ROLLING_FRICTION, SPINNING_FRICTION
 from scenewright.stages.kit.geometry.transforms import quaternion_of
 
-KEY_FRAME = "reconstructed"
+KEY_FRAME, SPAWN = "reconstructed", "spawn"
 
 
-def write_mjcf(path: Path, urdf: Urdf, joint_values: dict[str, float]) -> None:
-    """Write a kinematic tree (root link `world`) as MJCF; mesh paths are relative to `path`.
+def write_mjcf(path: Path, urdf: Urdf, joint_values: dict[str, float], spawn: np.ndarray | None = None) -> None:
+    """Write a kinematic tree (root link `world`) as MJCF; mesh paths are relative to `path`. `spawn`: world_from_base
+    (4, 4) of the site `spawn`, to which a robot can be attached.
 
     MuJoCo allows free joints only right under the world: children of floating joints go there with their world poses.
     The key frame `reconstructed` holds the given joint values and the poses of the free bodies.
@@ -35,6 +36,8 @@ def write_mjcf(path: Path, urdf: Urdf, joint_values: dict[str, float]) -> None:
     assets = ElementTree.SubElement(root, "asset")
     world = ElementTree.SubElement(root, "worldbody")
     ElementTree.SubElement(world, "light", name="lamp", pos="0 0 3", dir="0 0 -1", directional="true")
+    if spawn is not None:
+        ElementTree.SubElement(world, "site", name=SPAWN, pos=numbers(spawn[:3, 3]), quat=_quaternion(spawn))
     contact = ElementTree.SubElement(root, "contact")
     children: dict[str, list[UrdfJoint]] = {}
     for joint in urdf.joints:

@@ -80,7 +80,9 @@ def read_frame(folder: Path, name: str) -> LabelledFrame:
     color, depth, label = (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in frame_files(folder, name))
     size = (CAMERA.height, CAMERA.width)
     if color is None or depth is None or label is None:
-        raise BadInput(f"{folder / name}: color, depth or label is missing or no PNG", hint="copy the data set again")
+        raise BadInput(
+            f"{folder / name}: the colour, depth or label image is missing or no PNG", hint="copy the data set again"
+        )
     if color.shape != (*size, 3) or depth.shape != size or depth.dtype != np.uint16 or label.shape != size:
         raise BadInput(f"{folder / name}: not a frame of 640x480 with 16-bit depth", hint="copy the data set again")
     parts = np.where(label >= FIRST_OBJECT, label, 0).astype(np.int32)

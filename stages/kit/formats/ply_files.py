@@ -83,7 +83,7 @@ def read_ply(path: Path) -> ColoredMesh:
     while not header.endswith(b"end_header\n"):
         line = lines.readline(200)
         if not line.endswith(b"\n"):
-            raise BadInput(f"{path}: no PLY header")
+            raise BadInput(f"{path}: no PLY header", hint="make the artifact again")
         words = line.split()
         if len(words) == 3 and words[0] == b"element" and words[2].isdigit():
             counts[words[1].decode("ascii", "replace")] = int(words[2])
@@ -94,12 +94,15 @@ def read_ply(path: Path) -> ColoredMesh:
     body = data[len(header) :]
     split = vertices * _VERTEX.itemsize
     if len(body) != split + faces * _FACE.itemsize:
-        raise BadInput(f"{path}: torn: {len(body)} bytes, expected {split + faces * _FACE.itemsize}")
+        raise BadInput(
+            f"{path}: torn: {len(body)} bytes, expected {split + faces * _FACE.itemsize}",
+            hint="make the artifact again",
+        )
     table = np.frombuffer(body[:split], dtype=_VERTEX)
     rows = np.frombuffer(body[split:], dtype=_FACE)
     triangles = rows["indices"].astype(np.int32)
     if (rows["count"] != 3).any() or (faces and (triangles.min() < 0 or triangles.max() >= vertices)):
-        raise BadInput(f"{path}: a face is not a triangle of its vertices")
+        raise BadInput(f"{path}: a face is not a triangle of its vertices", hint="make the artifact again")
     return ColoredMesh(
         np.stack([table[name] for name in "xyz"], axis=1).astype(np.float32),
         triangles,

@@ -28,7 +28,7 @@ def decode_rle(encoding: Any, shape: tuple[int, int]) -> np.ndarray:
     if size != [shape[0], shape[1]]:
         raise BadInput(
             f"its RLE is of {size[1]!r:.12} x {size[0]!r:.12} pixels, the frame of {shape[1]} x {shape[0]}",
-            hint="masks have the size of the sequence's pictures",
+            hint="masks have the size of the sequence's images",
         )
     counts = encoding["counts"]
     runs = _runs_of_text(counts) if isinstance(counts, str) else _runs_of_list(counts)
@@ -36,8 +36,8 @@ def decode_rle(encoding: Any, shape: tuple[int, int]) -> np.ndarray:
     if len(runs) and int(runs.min()) < 0:
         raise BadInput(f"its RLE has a run of {int(runs.min())} pixels", hint="it is damaged; write it again")
     if len(runs) and (int(runs.max()) > pixels or int(runs.sum()) != pixels) or not len(runs):
-        total = "more than the picture" if len(runs) and int(runs.max()) > pixels else f"{int(runs.sum())} pixels"
-        raise BadInput(f"its RLE adds up to {total}, the picture has {pixels}", hint="it is damaged; write it again")
+        total = "more than the image" if len(runs) and int(runs.max()) > pixels else f"{int(runs.sum())} pixels"
+        raise BadInput(f"its RLE adds up to {total}, the image has {pixels}", hint="it is damaged; write it again")
     values = np.arange(len(runs)) % 2 == 1
     return np.repeat(values, runs).reshape(shape, order="F")
 

@@ -12,7 +12,7 @@ from scenewright.schemas.base import as_transform
 from scenewright.schemas.cad_library import CadModel
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody, Spawn
 from scenewright.schemas.scene_parts import Box
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.mjcf_file import write_mjcf
@@ -85,8 +85,10 @@ class BundleBody:
         return replace(self, movable=False, furniture=False, because=f"held: {why}")
 
 
-def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraphFile) -> InteractiveSceneFile:
-    """Write kind interactive_scene into `root` and return what stands in scene.json.
+def write_scene_bundle(
+    root: Path, bodies: list[BundleBody], graph: ContactGraphFile, spawn: Spawn | None = None
+) -> InteractiveSceneFile:
+    """Write kind interactive_scene into `root` and return what stands in scene.json. `spawn`: a place for a robot.
 
     `scene.urdf`: every body hangs on its parent, on a floating joint when it is movable, else on a fixed one; joints
     inside articulated models are kept. `static.urdf`: what is not movable, fixed to the nearest ancestor that is
@@ -119,8 +121,8 @@ def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraph
     for file in checked:
         require_sound(file, root)
     values = {name: value for body_links in links.values() for name, value in (body_links.joint_values or {}).items()}
-    write_mjcf(root / "scene.mjcf.xml", combined, values)
-    scene = InteractiveSceneFile(bodies=tuple(_record(body, links[body.name]) for body in ordered))
+    write_mjcf(root / "scene.mjcf.xml", combined, values, None if spawn is None else np.array(spawn.world_from_base))
+    scene = InteractiveSceneFile(bodies=tuple(_record(body, links[body.name]) for body in ordered), spawn=spawn)
     scene.write(root / "scene.json")
     graph.write(root / "graph.json")
     return scene
@@ -132,16 +134,18 @@ def _check_bodies(bodies: list[BundleBody]) -> list[BundleBody]:
         if not NAME.fullmatch(body.name) or body.name == WORLD or body.name.startswith((".", "-")):
             raise BadInput(f"body name {body.name!r} is not usable in URDF", hint="use ASCII letters, digits and _")
         if body.name in names:
-            raise BadInput(f"two bodies are called {body.name!r}")
+            raise BadInput(f"two bodies are called {body.name!r}", hint="rename one of them")
         names.add(body.name)
         if not is_rigid(body.world_from_body):
-            raise BadInput(f"body {body.name}: pose is not a rigid transform")
+            raise BadInput(f"body {body.name}: pose is not a rigid transform", hint="give a rotation and a shift")
         if not (np.isfinite(body.scale) and body.scale > 0):
-            raise BadInput(f"body {body.name}: scale is {body.scale}")
+            raise BadInput(f"body {body.name}: scale is {body.scale}", hint="give a scale over 0")
         if body.mass is not None and not (np.isfinite(body.mass) and body.mass > 0):
-            raise BadInput(f"body {body.name}: mass is {body.mass} kg")
+            raise BadInput(f"body {body.name}: mass is {body.mass} kg", hint="give a mass over 0")
         if (body.model is None) != (body.model_folder is None):
-            raise BadInput(f"body {body.name}: a CAD model needs both its record and its folder")
+            raise BadInput(
+                f"body {body.name}: a CAD model needs both its record and its folder", hint="give both, or neither"
+            )
     return bodies
 
 
@@ -155,9 +159,12 @@ def _parents_first(bodies: list[BundleBody]) -> list[BundleBody]:
         name: str | None = body.name
         while name not in (None, SCENE_NODE) and name not in ordered:
             if name in path:
-                raise BadInput(f"bodies carry each other in a circle: {' -> '.join((*list(path)[-9:], name))}")
+                raise BadInput(
+                    f"bodies carry each other in a circle: {' -> '.join((*list(path)[-9:], name))}",
+                    hint="let the scene carry one of them",
+                )
             if name not in by_name:
-                raise BadInput(f"body {list(path)[-1]}: parent {name!r} does not exist")
+                raise BadInput(f"body {list(path)[-1]}: parent {name!r} does not exist", hint="name one of the bodies")
             path[name] = by_name[name]
             name = by_name[name].parent
         for carried in reversed(path.values()):

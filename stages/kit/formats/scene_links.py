@@ -182,7 +182,10 @@ def _copy_shape(
         return replace(shape, box_size=(x, y, z), link_from_shape=frame)
     source = (folder / (shape.mesh or "")).resolve()
     if not source.is_relative_to(folder.resolve()) or not source.is_file():
-        raise BadInput(f"{folder / URDF_FILE}: mesh {shape.mesh!r} is not a file of the model folder")
+        raise BadInput(
+            f"{folder / URDF_FILE}: mesh {shape.mesh!r} is not a file of the model folder",
+            hint="build the CAD library again",
+        )
     relative = source.relative_to(folder.resolve())
     if relative.suffix.lower() not in URDF_MESHES:
         relative = relative.with_suffix(".obj")

@@ -17,6 +17,7 @@ EARLIEST = 1_000_000_000
 LONGEST_STEP, USUAL_STEP = 1000, 10
 """Median step between pictures or poses [s]: no recording that begins at 0 has a longer one, so that its stamps are in
 the unit in which the step is a usual one."""
+TIMES = "write seconds; or, since 1970, milliseconds, microseconds or nanoseconds"
 LONGEST_PAUSE = 100_000
 """Median step [s] that no recording has, whatever its times are: more than a day."""
 UNITS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
@@ -55,9 +56,9 @@ def exact_stamps(texts: Sequence[str], where: Sequence[str]) -> StampColumn:
     column = read_column(texts)
     for text, place, stamp in zip(texts, where, column.stamps, strict=True):
         if stamp is None and _number(text) is None:
-            raise BadInput(f"{place}: {text!r:.40} is not a time stamp")
+            raise BadInput(f"{place}: {text!r:.40} is not a time stamp", hint=TIMES)
         if stamp is None:
-            raise BadInput(f"{place}: time stamp {text:.40} is not between 0 and {LATEST_STAMP} seconds")
+            raise BadInput(f"{place}: time stamp {text:.40} is not between 0 and {LATEST_STAMP} seconds", hint=TIMES)
     return column
 
 

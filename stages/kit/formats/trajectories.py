@@ -52,7 +52,7 @@ def read_tum(path: Path) -> tuple[np.ndarray, np.ndarray]:
     poses = [transform_from_numbers(row[1:], f"{path}: line {line}") for line, row in rows]
     endless = np.flatnonzero(~np.isfinite(times))
     if len(endless):
-        raise BadInput(f"{path}: line {rows[int(endless[0])][0]}: time is not finite")
+        raise BadInput(f"{path}: line {rows[int(endless[0])][0]}: time is not finite", hint="leave that line out")
     backward = np.flatnonzero(np.diff(times) <= 0)
     if len(backward):
         line = rows[int(backward[0]) + 1][0]
@@ -111,7 +111,7 @@ def transform_from_numbers(numbers: np.ndarray, where: str) -> np.ndarray:
     quaternion = np.asarray(numbers[3:7], dtype=float)
     norm = float(np.linalg.norm(quaternion))
     if not np.isfinite(numbers).all():
-        raise BadInput(f"{where}: pose is not finite")
+        raise BadInput(f"{where}: pose is not finite", hint="leave it out")
     if abs(norm - 1) > QUATERNION_TOLERANCE:
         raise BadInput(f"{where}: quaternion has norm {norm:.4g}, expected 1", hint="the order is x y z w")
     matrix = np.eye(4)
@@ -131,7 +131,7 @@ def number_rows(path: Path, columns: int) -> list[tuple[int, np.ndarray]]:
         if not fields:
             continue
         if len(fields) != columns:
-            raise BadInput(f"{path}: line {line}: {len(fields)} columns, expected {columns}")
+            raise BadInput(f"{path}: line {line}: {len(fields)} columns, expected {columns}", hint="correct that line")
         rows.append((line, _numbers(fields, f"{path}: line {line}")))
     return rows
 
@@ -145,7 +145,7 @@ def named_rows(path: Path, columns: int) -> list[tuple[int, str, np.ndarray]]:
     for line, text in enumerate(read_text(path).splitlines(), start=1):
         fields = text.split("#", 1)[0].split()
         if fields and len(fields) != columns:
-            raise BadInput(f"{path}: line {line}: {len(fields)} columns, expected {columns}")
+            raise BadInput(f"{path}: line {line}: {len(fields)} columns, expected {columns}", hint="correct that line")
         if fields:
             rows.append((line, fields[0], _numbers(fields[1:], f"{path}: line {line}")))
     return rows
@@ -155,7 +155,7 @@ def read_matrix(path: Path, rows: int = 4, columns: int = 4) -> np.ndarray:
     """Return the (rows, columns) matrix in a text file, whatever the line breaks. Raises BadInput."""
     fields = read_text(path).split()
     if len(fields) != rows * columns:
-        raise BadInput(f"{path}: {len(fields)} numbers, expected {rows}x{columns}")
+        raise BadInput(f"{path}: {len(fields)} numbers, expected {rows}x{columns}", hint="write the matrix row by row")
     return _numbers(fields, str(path)).reshape(rows, columns)
 
 
@@ -175,15 +175,21 @@ def read_numbered_open3d_log(path: Path) -> list[tuple[int, np.ndarray]]:
     """
     lines = [line for line in read_text(path).splitlines() if line.strip()]
     if len(lines) % 5:
-        raise BadInput(f"{path}: {len(lines)} lines, expected a multiple of 5 (header and 4 matrix rows)")
+        raise BadInput(
+            f"{path}: {len(lines)} lines, expected a multiple of 5 (header and 4 matrix rows)",
+            hint="give each pose a header and four rows",
+        )
     poses = []
     for start in range(0, len(lines), 5):
         header = lines[start].split()
         if len(header) != 3 or not all(INTEGER.fullmatch(field) for field in header):
-            raise BadInput(f"{path}: entry {start // 5}: header {lines[start]!r:.60} is not three integers")
+            raise BadInput(
+                f"{path}: entry {start // 5}: header {lines[start]!r:.60} is not three integers",
+                hint="write a frame number three times",
+            )
         rows = [line.split() for line in lines[start + 1 : start + 5]]
         if any(len(row) != 4 for row in rows):
-            raise BadInput(f"{path}: entry {start // 5}: matrix is not 4x4")
+            raise BadInput(f"{path}: entry {start // 5}: matrix is not 4x4", hint="write four rows of four numbers")
         matrix = _numbers([field for row in rows for field in row], f"{path}: entry {start // 5}").reshape(4, 4)
         poses.append((int(header[0]), matrix))
     return poses
@@ -200,7 +206,7 @@ def write_open3d_log(path: Path, world_from_camera: np.ndarray) -> None:
 
 def read_text(path: Path) -> str:
     """Return the text of a file. Raises BadInput when it is missing, no text, or larger than LARGEST_TEXT bytes."""
-    return file_text(path, LARGEST_TEXT)
+    return file_text(path, LARGEST_TEXT, hint="correct it, or copy it again")
 
 
 def _numbers(fields: list[str], where: str) -> np.ndarray:
@@ -208,7 +214,7 @@ def _numbers(fields: list[str], where: str) -> np.ndarray:
         return np.array([float(field) for field in fields])
     except ValueError:
         bad = next(field for field in fields if not _is_number(field))
-        raise BadInput(f"{where}: {bad!r:.40} is not a number") from None
+        raise BadInput(f"{where}: {bad!r:.40} is not a number", hint="correct it") from None
 
 
 def _is_number(field: str) -> bool:

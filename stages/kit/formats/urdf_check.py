@@ -95,7 +95,7 @@ def advice(path: Path) -> list[Problem]:
         for link in urdf.links
         if any(primitive.kind == "capsule" for primitive in link.primitives)
     ]
-    robot = parse_xml(file_content(Path(path), MAXIMUM_BYTES), str(path))
+    robot = parse_xml(file_content(Path(path), MAXIMUM_BYTES, hint="give a URDF"), str(path))
     unknown = [Problem("unknown", "robot", line) for line in unknown_elements([robot], KNOWN_URDF, COUNTED)]
     return untouched + capsules + unknown
 

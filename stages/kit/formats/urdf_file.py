@@ -218,9 +218,9 @@ def parse_urdf(path: Path) -> Urdf:
     What is well-formed but wrong (a cycle, a negative mass) is left to `check_urdf`.
     """
     path = Path(path)
-    robot = parse_xml(file_content(path, MAXIMUM_BYTES), str(path))
+    robot = parse_xml(file_content(path, MAXIMUM_BYTES, hint="give a URDF"), str(path))
     if robot.tag != "robot":
-        raise BadInput(f"{path}: root element is <{robot.tag}>, expected <robot>")
+        raise BadInput(f"{path}: root element is <{robot.tag}>, expected <robot>", hint="give a URDF")
     links = tuple(_parse_link(element, path) for element in robot.findall("link"))
     joints = tuple(_parse_joint(element, path) for element in robot.findall("joint"))
     return Urdf(robot.get("name", ""), links, joints)
@@ -230,9 +230,9 @@ def _floats(text: str | None, count: int, where: str) -> np.ndarray:
     try:
         values = np.array([float(part) for part in (text or "").split()])
     except ValueError:
-        raise BadInput(f"{where}: {text!r} is not {count} numbers") from None
+        raise BadInput(f"{where}: {text!r} is not {count} numbers", hint="correct it") from None
     if len(values) != count:
-        raise BadInput(f"{where}: {text!r} is not {count} numbers")
+        raise BadInput(f"{where}: {text!r} is not {count} numbers", hint="correct it")
     return values
 
 
@@ -258,13 +258,15 @@ def _parse_shape(element: ElementTree.Element, where: str) -> Shape | None:
     if mesh is not None:
         scale = _floats(mesh.get("scale", "1 1 1"), 3, f"{where}: scale")
         if np.isfinite(scale).all() and np.ptp(scale) > 1e-9:
-            raise BadInput(f"{where}: mesh scale {mesh.get('scale')} is not uniform")
+            raise BadInput(
+                f"{where}: mesh scale {mesh.get('scale')} is not uniform", hint="scale the mesh in its own file"
+            )
         return Shape(mesh=mesh.get("filename", ""), scale=float(scale[0]), link_from_shape=transform, color=color)
     if block is not None:
         x, y, z = _floats(block.get("size"), 3, f"{where}: box size")
         return Shape(box_size=(float(x), float(y), float(z)), link_from_shape=transform, color=color)
     if element.find("geometry") is None:
-        raise BadInput(f"{where}: no geometry")
+        raise BadInput(f"{where}: no geometry", hint="give it a mesh, box, cylinder or sphere")
     return None
 
 
@@ -276,7 +278,7 @@ def _parse_link(element: ElementTree.Element, path: Path) -> Link:
     if inertial is not None:
         mass, tensor = inertial.find("mass"), inertial.find("inertia")
         if mass is None or tensor is None:
-            raise BadInput(f"{where}: inertial without mass or inertia")
+            raise BadInput(f"{where}: inertial without mass or inertia", hint="give both, or leave the inertial out")
         xx, xy, xz, yy, yz, zz = (
             float(_floats(tensor.get(key, "0"), 1, f"{where}: {key}")[0])
             for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -315,7 +317,7 @@ def joint_ends(element: ElementTree.Element, where: str) -> tuple[str, str]:
     for tag in ("parent", "child"):
         end = element.find(tag)
         if end is None or not end.get("link"):
-            raise BadInput(f"{where}: no {tag} link")
+            raise BadInput(f"{where}: no {tag} link", hint="name that link")
         ends.append(end.get("link", ""))
     return ends[0], ends[1]
 

@@ -34,7 +34,7 @@ def parse_xml(data: bytes, where: str) -> ElementTree.Element:
         if elements > MOST_ELEMENTS:
             raise BadInput(f"{where}: more than {MOST_ELEMENTS} elements and attributes", hint="split it")
         if depth > DEEPEST:
-            raise BadInput(f"{where}: nested deeper than {DEEPEST} levels")
+            raise BadInput(f"{where}: nested deeper than {DEEPEST} levels", hint="nest its elements less deeply")
 
     def leave(*_: object) -> None:
         nonlocal depth
@@ -49,9 +49,9 @@ def parse_xml(data: bytes, where: str) -> ElementTree.Element:
         for start in range(0, len(data), PIECE):
             guard.Parse(data[start : start + PIECE], False)
             if start + PIECE - guard.CurrentByteIndex > LONGEST_TAG:
-                raise BadInput(f"{where}: a tag of more than {LONGEST_TAG} bytes")
+                raise BadInput(f"{where}: a tag of more than {LONGEST_TAG} bytes", hint="shorten it")
         guard.Parse(b"", True)
         return ElementTree.fromstring(data)
     # LookupError: an encoding that Python does not know; ValueError: one of more than one byte a character.
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
-        raise BadInput(f"{where}: no well-formed XML: {error}") from None
+        raise BadInput(f"{where}: no well-formed XML: {error}", hint="correct it there") from None

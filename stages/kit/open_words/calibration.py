@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_toml
-from scenewright.schemas.places import data_file
+from scenewright.schemas.places import REINSTALL, data_file
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.open_words.encoder import Encoder
 
@@ -99,11 +99,13 @@ def fitted(weights: Sequence[float], least_recognised: float = -1.0, strange: fl
 def calibration_of(source: str, encoder: str, path: Path = BUNDLED) -> Calibration:
     """Return what was fitted for a source (`splat`, NAMED_SPLAT, `panoptic_map`) and the label of an encoder; UNFITTED
     where nothing was. Raises BadInput for a damaged file."""
-    for entry in file_toml(path).get("fit", ()):
+    for entry in file_toml(path, hint=REINSTALL).get("fit", ()):
         try:
             if (entry["source"], entry["encoder"]) == (source, encoder):
                 weights = [float(entry[name]) for name in WEIGHTS]
                 return fitted(weights, float(entry["least_recognised"]), float(entry["strange"]))
         except (KeyError, TypeError, ValueError):
-            raise BadInput(f"{path}: an entry lacks source, encoder or {', '.join((*WEIGHTS, *OF_PLACES))}") from None
+            raise BadInput(
+                f"{path}: an entry lacks source, encoder or {', '.join((*WEIGHTS, *OF_PLACES))}", hint=REINSTALL
+            ) from None
     return UNFITTED

@@ -44,7 +44,7 @@ class EmbeddedEncoder:
     def __init__(self, path: Path = BUNDLED) -> None:
         tensors, metadata = read_safetensors(path)
         if metadata.get("format") != FORMAT or metadata.get("version") != VERSION:
-            raise BadInput(f"{path}: no encoder of pictures and words, version {VERSION}", hint=_OTHER)
+            raise BadInput(f"{path}: no encoder of images and words, version {VERSION}", hint=_OTHER)
         try:
             self.vocabulary = frozenset(map(str, json.loads(metadata.get("vocabulary", ""))))
         except (ValueError, TypeError, RecursionError):

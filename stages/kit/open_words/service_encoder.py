@@ -24,7 +24,7 @@ LARGEST_SIDE = 1024
 """Largest side of a crop that a service may ask for [px]; a bound."""
 LARGEST_WIDTH = 65536
 """Most numbers of a vector that a service may send; a bound."""
-_HINT = "is this an encoder of pictures and words? see docs/SPLATS.md"
+_HINT = "is this an encoder of images and words? see docs/SPLATS.md"
 
 
 class ServiceEncoder:

@@ -63,7 +63,7 @@ def read(text: str, where: str) -> Tree:
     try:
         listed = parse_expression(text)
     except BadInput as error:
-        raise refuse(where, str(error).removeprefix("PDDL: ")) from None
+        raise refuse(where, error.message.removeprefix("PDDL: ")) from None
     return _tree(listed, where, 0)
 
 

@@ -161,7 +161,7 @@ def build_soup(
             )
         )
     if not arrays_of_meshes:
-        raise BadInput("nothing to render: the meshes hold no triangle with an area")
+        raise BadInput("nothing to render: the meshes hold no triangle with an area", hint="give meshes with surfaces")
     joined = [np.concatenate(columns) for columns in zip(*arrays_of_meshes, strict=True)]
     corners, normals, smooth, colors, instances, rows = joined
     rows_of_table = np.stack([material.row() for material in table])

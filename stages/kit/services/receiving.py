@@ -74,7 +74,7 @@ class BoundedServer(ThreadingHTTPServer):
                 f"{host:.80}:{port}: {getattr(error, 'strerror', None) or error}", hint="choose another port or address"
             ) from None
         except (ValueError, TypeError):  # half a character, a zero byte, a label of more than 63 letters
-            raise UsageError(f"{host!r:.80} is not a host name") from None
+            raise UsageError(f"{host!r:.80} is not a host name", hint="give a name or an address: 127.0.0.1") from None
 
     def server_bind(self) -> None:
         """Bind, without asking a name server what this machine is called."""

@@ -284,7 +284,7 @@ def _multipart(sections: list[tuple[str, str, bytes]]) -> tuple[bytes, str]:
 def _png(image: np.ndarray) -> bytes:
     done, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not done:
-        raise BadInput(f"an image {image.shape} cannot be written as PNG")
+        raise BadInput(f"an image {image.shape} cannot be written as PNG", hint="give an image of pixels")
     return data.tobytes()
 
 

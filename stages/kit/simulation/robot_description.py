@@ -303,7 +303,10 @@ def _installed(urdf: Path) -> Path:
         raise MissingDependency("the package pybullet is not installed", hint="run `make setup`") from None
     path = Path(pybullet_data.getDataPath()) / urdf
     if not path.is_file():
-        raise MissingDependency(f"{urdf}: the robot's URDF lies neither beside its description nor in pybullet_data")
+        raise MissingDependency(
+            f"{urdf}: the robot's URDF lies neither beside its description nor in pybullet_data",
+            hint="put it beside the description",
+        )
     return path
 
 

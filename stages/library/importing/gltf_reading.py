@@ -41,7 +41,7 @@ def read_gltf(folder: SourceFolder, path: Path) -> MeshContent:
     if gltf_pixels(data, str(path), hint=SIMPLIFY) > MOST_PIXELS:
         _drop_pictures(tree)
         data = _glb(tree, [binary])
-        findings.append(f"{path.name}: its pictures are too large, colours are those of the materials")
+        findings.append(f"{path.name}: its images are too large, colours are those of the materials")
     meshes = meshes_of_glb(
         data,
         str(path),
@@ -105,13 +105,13 @@ def _with_pictures_inside(
     if used:
         _drop_pictures(tree)
         way = way_out(used[0], path.name)
-        return binary, [f"{path.name}: pictures need {used[0]}, colours are those of the materials ({way} turns them)"]
+        return binary, [f"{path.name}: images need {used[0]}, colours are those of the materials ({way} turns them)"]
     parts, length = [binary, b"\0" * (-len(binary) % 4)], len(binary) + -len(binary) % 4
     for image in tree.get("images", []):
         if "uri" not in image:
             continue
         try:
-            data = _named(folder, path, str(image.pop("uri")), "picture")
+            data = _named(folder, path, str(image.pop("uri")), "image")
         except BadInput as error:
             _drop_pictures(tree)
             return binary, [f"{error.message.removeprefix(f'{path.parent}/')}: colours are those of the materials"]
@@ -120,7 +120,7 @@ def _with_pictures_inside(
         parts += [data, b"\0" * (-len(data) % 4)]
         length += len(data) + -len(data) % 4
         if length > LARGEST_FILE:
-            raise BadInput(f"{path}: buffers and pictures of more than {LARGEST_FILE} bytes", hint=SIMPLIFY)
+            raise BadInput(f"{path}: buffers and images of more than {LARGEST_FILE} bytes", hint=SIMPLIFY)
     return b"".join(parts), []
 
 

@@ -36,6 +36,7 @@ MOST_FINDINGS = 40
 LONGEST_TEXT = 300
 """Longest name or finding [characters]."""
 SIMPLIFY = f"simplify it to at most {MOST_TRIANGLES} triangles and {MOST_SHAPES} shapes, or split it"
+MEND = "correct that in the file, or leave it out"
 REFUSALS = (*(ArithmeticError, RecursionError, ValueError, ShapelyError), *(cv2.error, csv.Error, struct.error))
 """What geometry libraries and parsers raise for numbers that they cannot take (LinAlgError and UnicodeError are
 ValueErrors). IndexError, KeyError, TypeError are not among them: those are bugs of ours."""
@@ -47,14 +48,16 @@ def told_refusals(where: str) -> Iterator[None]:
     try:
         with np.errstate(all="ignore"):
             yield
-    except BadInput:
-        raise
+    except BadInput as error:
+        if error.hint:
+            raise
+        raise BadInput(error.message, hint=MEND) from error
     except QhullError as error:
-        raise BadInput(f"{where}: a shape has no volume: it is flat, or a line", hint="mend it") from error
+        raise BadInput(f"{where}: a shape has no volume: it is flat, or a line", hint=MEND) from error
     except REFUSALS as error:
         reason = (str(error).strip().splitlines() or [""])[0]
         raise BadInput(
-            f"{where}: its geometry cannot be used: {type(error).__name__}: {reason:.120}", hint="mend it"
+            f"{where}: its geometry cannot be used: {type(error).__name__}: {reason:.120}", hint=MEND
         ) from error
 
 

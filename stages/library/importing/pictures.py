@@ -43,7 +43,7 @@ class Pictures:
         return sum(picture.size for picture in self._decoded.values() if picture is not None)
 
     def _read(self, name: str) -> np.ndarray | None:
-        label = f"{self._path.name}: picture {Path(name.replace(chr(92), '/')).name!r:.60}"
+        label = f"{self._path.name}: image {Path(name.replace(chr(92), '/')).name!r:.60}"
         file = self._folder.find(name, self._path.parent)
         picture = None
         if file is not None and file.stat().st_size <= LARGEST_PICTURE:

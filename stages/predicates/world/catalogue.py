@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 from scenewright.schemas.base import Model
-from scenewright.schemas.outside import LARGEST_SETTINGS, file_toml
-from scenewright.schemas.places import data_file
+from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import REINSTALL, data_file
 
 KITCHEN = data_file("kitchen/kitchen.toml")
 DOMAINS = ("store_objects", "set_table", "cook_meal")
@@ -60,4 +60,4 @@ class KitchenFile(Model):
 @cache
 def kitchen_file() -> KitchenFile:
     """Return the kitchen's catalogue."""
-    return KitchenFile.model_validate(file_toml(KITCHEN, LARGEST_SETTINGS))
+    return KitchenFile.model_validate(file_toml(KITCHEN, hint=REINSTALL))

@@ -51,7 +51,7 @@ def label_map(network: Network, label_set: LabelSet | None) -> LabelMap:
         if count is not None and count != len(labels.labels):
             raise BadInput(f"{name}: has {count} classes, {set_name} has {len(labels.labels)}", hint=HINT)
         names = {number: label.name for number, label in enumerate(labels.labels)}
-    return _warn_of_unknown(match_labels(names, label_set or labels, where=name), name)
+    return _warn_of_unknown(match_labels(names, label_set, labels, where=name), name)
 
 
 def class_count(network: Network) -> int | None:

@@ -39,13 +39,15 @@ class OnnxNetwork:
         try:
             self._session = runtime.InferenceSession(str(self.path), options, providers=providers)
         except Exception as error:  # its exceptions have no common base but this
-            raise BadInput(f"{self.path.name}: no ONNX network that can be run ({_first_line(error)})") from None
+            raise BadInput(
+                f"{self.path.name}: no ONNX network that can be run ({_first_line(error)})", hint=BY_FOLDER
+            ) from None
         self._input = self._find_input()
         batch = len(self._input.shape) == 4
         own_size = self._own_size()
         if sidecar and sidecar.size and own_size not in (None, sidecar.size):
             raise BadInput(
-                f"{self.path.name}: takes pictures of {own_size}, the sidecar says {sidecar.size}",
+                f"{self.path.name}: takes images of {own_size}, the sidecar says {sidecar.size}",
                 hint="leave `size` out of the sidecar",
             )
         self.size = sidecar.size if sidecar and sidecar.size else own_size
@@ -89,7 +91,7 @@ class OnnxNetwork:
         except Exception as error:  # see above
             height, width = fitted.tensor.shape[-2:]
             raise BadInput(
-                f"{self.path.name}: cannot be run on a picture of {width}x{height} ({_first_line(error)})",
+                f"{self.path.name}: cannot be run on an image of {width}x{height} ({_first_line(error)})",
                 hint=f"where it was made for another size, `size` in a sidecar says it. Else {BY_FOLDER}",
             ) from None
         names = [output.name for output in self._session.get_outputs()]
@@ -108,7 +110,7 @@ class OnnxNetwork:
             )
         if len(shape) == 4 and isinstance(shape[0], int) and shape[0] != 1:
             raise BadInput(
-                f"{self.path.name}: takes {shape[0]} pictures at a time",
+                f"{self.path.name}: takes {shape[0]} images at a time",
                 hint="export it for one (yolo export ... batch=1)",
             )
         return inputs[0]

@@ -143,7 +143,7 @@ class TfliteNetwork:
             )
         if shape[0] != 1:
             raise BadInput(
-                f"{self.path.name}: takes {shape[0]} pictures at a time",
+                f"{self.path.name}: takes {shape[0]} images at a time",
                 hint="export it for one (yolo export ... batch=1)",
             )
         return interpreter

@@ -39,8 +39,8 @@ class NeedleObservation:
         """Raise BadInput where the rig or the images' sizes cannot be."""
         if not self.rig.baseline > 0:
             raise BadInput(
-                f"The stereo rig's baseline is {self.rig.baseline} m: two eyes at one place measure no depth. "
-                "Check the calibration's baseline and the order of the eyes."
+                f"the stereo rig's baseline is {self.rig.baseline} m: two eyes at one place measure no depth",
+                hint="check the calibration's baseline and the order of the eyes",
             )
         size = (self.rig.height, self.rig.width)
         arrays = {
@@ -53,12 +53,12 @@ class NeedleObservation:
             "right mask of what hides": self.right_hidden,
         }
         if self.pictures is not None:
-            arrays |= {"left picture": self.pictures[0][..., 0], "right picture": self.pictures[1][..., 0]}
+            arrays |= {"left image": self.pictures[0][..., 0], "right image": self.pictures[1][..., 0]}
         for name, array in arrays.items():
             if array is not None and array.shape != size:
                 raise BadInput(
-                    f"The {name} is {array.shape} but the rig's images are {size} (rows, columns). "
-                    "Give masks of the rectified images at full size."
+                    f"the {name} is {array.shape}, the rig's images are {size} (rows, columns)",
+                    hint="give masks of the rectified images at full size",
                 )
 
 

@@ -50,8 +50,8 @@ class Segmenter:
         """
         if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or 0 in rgb.shape:
             raise BadInput(
-                f"The picture is {rgb.shape} {rgb.dtype}; it should be (rows, columns, 3) uint8 RGB. "
-                "Give a colour picture of 8 bits."
+                f"the image is {rgb.shape} {rgb.dtype}, expected (rows, columns, 3) uint8 RGB",
+                hint="give a colour image of 8 bits",
             )
         rows, columns = rgb.shape[:2]
         wide = np.pad(rgb, ((0, -rows % STRIDE), (0, -columns % STRIDE), (0, 0)), mode="edge")

@@ -112,16 +112,16 @@ def _check(left_mask: np.ndarray, right_mask: np.ndarray, rig: StereoRig, start:
     for name, mask in (("left", left_mask), ("right", right_mask)):
         if mask.shape != size or mask.dtype != bool:
             raise BadInput(
-                f"The {name} thread mask is {mask.shape} {mask.dtype}; the rig's images are {size} (rows, columns). "
-                "Give bool masks of the rectified images at full size."
+                f"the {name} thread mask is {mask.shape} {mask.dtype}, the rig's images are {size} (rows, columns)",
+                hint="give bool masks of the rectified images at full size",
             )
     if not rig.baseline > 0:
         raise BadInput(
-            f"The stereo rig's baseline is {rig.baseline} m: two eyes at one place measure no depth. "
-            "Check the calibration's baseline and the order of the eyes."
+            f"the stereo rig's baseline is {rig.baseline} m: two eyes at one place measure no depth",
+            hint="check the calibration's baseline and the order of the eyes",
         )
     if start is not None and (np.shape(start) != (3,) or not np.isfinite(start).all() or not start[2] > 0):
-        raise BadInput(f"The thread's start is {start}; it should be three numbers [m] before the left camera.")
+        raise BadInput(f"the thread's start is {start}", hint="give three numbers [m] before the left camera")
 
 
 def _curve(
@@ -233,7 +233,7 @@ def _remarks(path: Path, doubts: _Doubts) -> tuple[str, ...]:
             "thread, or a part that what lies before it cuts off."
         )
     if doubts.leaves:
-        remarks.append("The thread leaves the picture; its length is that of the part in it.")
+        remarks.append("The thread leaves the image; its length is that of the part in it.")
     if path.doubtful_gaps:
         remarks.append(f"At {path.doubtful_gaps} gaps another strand would continue the thread almost as well.")
     if path.doubtful_crossings:

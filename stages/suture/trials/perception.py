@@ -65,13 +65,11 @@ class PerceptionModel(Model):
 
 def perception_model(path: Path) -> PerceptionModel:
     """Read an error model (TOML). Raises BadInput when the file is not one."""
+    hint = "data/stitch/perception_thesis.toml shows one"
     try:
-        return PerceptionModel.model_validate(file_toml(path))
-    except (BadInput, ValidationError) as error:
-        reason = " ".join(str(error).split())[:200]
-        if isinstance(error, ValidationError):
-            reason = first_problem(error)
-        raise BadInput(f"{path}: no perception model ({reason}); see data/stitch/perception_thesis.toml") from error
+        return PerceptionModel.model_validate(file_toml(path, hint=hint))
+    except ValidationError as error:
+        raise BadInput(f"{path}: no perception model ({first_problem(error)})", hint=hint) from error
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ PICTURED_FROM_TRIAL = transform_from(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]
 """The needle world's wound runs away from the cameras, the trial's towards them."""
 SIGHTS = {
     "geometry": "estimates of rendered views of the trial, masks spoiled as a learned mask's",
-    "pictures": "estimates of rendered pictures of the trial, masks by the network",
+    "pictures": "estimates of rendered images of the trial, masks by the network",
 }
 LOOKS_OF_A_TRIAL = 100_000
 """Distance between the seeds of two trials: more than a trial has looks."""

@@ -28,7 +28,7 @@ def cluttered(view: StereoView, random: np.random.Generator) -> StereoView:
     """
     pictures = [view.left.image, view.right.image]
     if pictures[0] is None or pictures[1] is None:
-        raise ValueError("clutter is drawn into pictures")
+        raise ValueError("clutter is drawn into images")
     painted = [picture.astype(np.float32) for picture in pictures if picture is not None]
     depth = float(np.median(view.left.depth[view.left.depth > 0]))
     for _ in range(int(random.integers(0, MOST_BLOOD + 1))):

@@ -64,7 +64,7 @@ def draped(view: StereoView, random: np.random.Generator) -> StereoView:
     """
     pictures = [view.left.image, view.right.image]
     if pictures[0] is None or pictures[1] is None:
-        raise ValueError("drapes are drawn into pictures")
+        raise ValueError("drapes are drawn into images")
     depth = float(np.median(view.left.depth[view.left.depth > 0]))
     painted = [picture.astype(np.float32) for picture in pictures if picture is not None]
     canvas = _Canvas(painted, view.rig, depth, NEEDLE_RADIUS * view.rig.focal / depth)

@@ -122,7 +122,7 @@ def _depth(path: Path, scale: float | None) -> np.ndarray:
         if array.ndim != 2 or array.dtype != np.uint16:
             raise BadInput(
                 f"{path}: the depth image is {array.shape} {array.dtype}, not 16 bits in one channel",
-                hint="8-bit pictures of depth hold no distances",
+                hint="8-bit images of depth hold no distances",
             )
         usual = MILLIMETRE
     return np.asarray(array, dtype=np.float32) * np.float32(usual if scale is None else scale)

@@ -100,7 +100,7 @@ def _kind(great: float, picture_width: float | None, sizes: DishSizes) -> tuple[
         return None, ("heights unknown", "size unknown")
     radius = 0.5 * great / WIDTH * picture_width
     kind = min(sizes.dishes, key=lambda kind: abs(np.log(radius / sizes[kind].rim_radius)))
-    return kind, ("heights unknown", "size from the picture's width")
+    return kind, ("heights unknown", "size from the image's width")
 
 
 def _apart(outlines: list[Outline]) -> list[Outline]:

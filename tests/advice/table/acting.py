@@ -49,6 +49,15 @@ def given_seen_episode(folder: Path) -> None:
     seal(folder / "seen", "agent_episode")
 
 
+def given_kitchen(folder: Path) -> None:
+    """A scene with a bottle in a fridge, and a table."""
+    from tests.unit.simulation.handmade_scene import kitchen, write_scene
+    from tests.unit.viewing.artifacts import seal
+
+    write_scene(folder / "scene", kitchen())
+    seal(folder / "scene", "interactive_scene")
+
+
 def without_draws() -> int:
     """Draw no apartment at all."""
     with mock.patch("scenewright.stages.agent.world.generation.TRIES", 0):
@@ -218,6 +227,15 @@ ROWS = [
         PLAN + "--planner fast-downward --dry-run",
     ),
     Tried(
+        "stages/plan/stage.py",
+        "explain PLAN outcome",
+        "plan --scene scene --out p --goal 'on(bottle_7,table_3)' --goal 'in(bottle_7,fridge_2)'",
+        "explain p outcome",
+        code=4,
+        shows="goal_unsatisfiable",
+        given=given_kitchen,
+    ),
+    Tried(
         "stages/plan/parameters.py",
         "--stand",
         PLAN + "--stand 1 --stand 2 --dry-run",
@@ -225,7 +243,7 @@ ROWS = [
     ),
     NotTried(
         "stages/plan/tasks.py",
-        "declared with --assume",
+        "--assume declares",
         "a planned task of minutes: tests/unit/plan/test_tasks_and_checks.py",
     ),
     Tried(

@@ -115,7 +115,7 @@ ROWS = [
     ),
     Tried(
         "cli/batch_command.py",
-        "--retry {}: not one of {}",
+        "--retry {}: there is no such choice",
         "batch batch.toml --retry some --out b --dry-run",
         "batch batch.toml --retry none --out b --dry-run",
         given=given_batch,
@@ -158,7 +158,7 @@ ROWS = [
         right=cup_is_a_bottle,
         shows="outcome    ok",
     ),
-    Tried("cli/edit_command.py", "give --to or --shift, not both", MOVE + " --to 1 1 1", MOVE),
+    Tried("cli/edit_command.py", "--to and --shift both say where", MOVE + " --to 1 1 1", MOVE),
     Tried(
         "cli/edit_command.py",
         "see --help",
@@ -219,16 +219,12 @@ ROWS = [
     ),
     Tried(
         "cli/view_command.py",
-        "are for a page that is served: without --save and --rerun",
+        "are for a page that is served",
         "view {room}/sequence --save page.html --port 9000",
         "view {room}/sequence --save page.html",
     ),
     Tried(
-        "cli/explaining/explaining.py",
-        "lists its names",
-        "explain {fridge}/graph %",
-        "explain {fridge}/graph",
-        shows="fridge_",
+        "cli/explaining.py", "lists its names", "explain {fridge}/graph %", "explain {fridge}/graph", shows="fridge_"
     ),
     Tried(
         "cli/viewing/rerun_canvas.py",

@@ -74,7 +74,7 @@ ROWS = [
     ),
     Tried(
         "stages/disparity/eyes.py",
-        "topics of --color-topic and --right-topic exchanged",
+        "--color-topic and --right-topic exchanged",
         f"{LOG} && disparity --sequence out --out depth",
         f"ingest --log log/log.mcap --out again {EXCHANGED} && disparity --sequence again --out depth",
         code=3,

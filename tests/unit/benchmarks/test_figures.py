@@ -176,11 +176,13 @@ def test_headlines_for_one_screen_say_it_in_few_words(tmp_path: Path) -> None:
     spec = (
         '"wall" = { figures = ["brushes", "ours/wall/time", "theirs/wall/time"], simulated = "paint", rival = "B" }\n'
         '"fence" = { figures = ["brushes", "ours/fence/time"], simulated = "″" }\n'
+        '"alone" = { figures = ["brushes", "ours/fence/time"], simulated = "″", rival = "B: not run" }\n'
     )
     text = render(f"<!-- headlines\n{spec}-->\n<!-- /headlines -->", brushes(tmp_path), {"brushes": "b.md"})
     assert "| figure | ours | beside it | cases | simulated | measured |" in text
     assert "| [wall](b.md) [s] | 3.25 [3.0, 3.5] | B 8.50 [–] | 4 cases | paint | 2026-01-02 |" in text
     assert "| [fence](b.md) [s] | 12 [–] | – | 2 cases | ″ | 2026-01-02 |" in text
+    assert "| [alone](b.md) [s] | 12 [–] | B: not run | 2 cases | ″ | 2026-01-02 |" in text
 
 
 def test_the_index_of_results_is_one_screen() -> None:

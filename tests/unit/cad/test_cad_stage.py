@@ -152,6 +152,22 @@ def test_thesis_method_runs_without_refinement(furnished, replace_objects):
     assert ours["chair_3"].chosen.alignment_error <= found["chair_3"].chosen.alignment_error + 1e-9
 
 
+def test_what_was_tried_is_told_in_order(scene):
+    """Every way says what it gave, and why or why not; so does what is held and what is free."""
+    by_node = {entry.node: entry for entry in scene.info.replacements}
+    for entry in by_node.values():
+        if entry.decision == "layout":
+            assert entry.tries == () and entry.stays == ""
+            continue
+        assert [tried.way for tried in entry.tries] == ["library", "stretched", "by_shape", "family", "built_in"]
+        assert all(tried.because or tried.model_id for tried in entry.tries)
+        assert entry.stays.startswith(("held: ", "free: "))
+    chosen = [entry.chosen for entry in by_node.values() if entry.chosen is not None]
+    assert all(one.explained is not None and one.score is not None for one in chosen)
+    told = [c for entry in by_node.values() for c in entry.alternatives if c.explained is not None]
+    assert told and all(0 <= c.explained <= 1 for c in told)
+
+
 def test_what_has_no_candidate_keeps_its_mesh(replace_objects):
     meshes = {1: floor_mesh(), 2: box_mesh((0, 0, 0), (0.1, 0.1, 0.3)), 3: box_mesh((-1, -1, 0), (-0.9, -0.2, 1.1))}
     scene = replace_objects(meshes, {1: "floor", 2: "bottle", 3: "box"}, maximum_scale=1.1)

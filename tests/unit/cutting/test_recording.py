@@ -83,7 +83,7 @@ def test_every_cut_is_kept_at_once_and_a_recording_is_gone_on_with(tmp_path: Pat
 @pytest.mark.parametrize(
     ("points", "said"),
     [
-        ([[100, 5], [WIDTH + 100, 300]], "two pictures"),
+        ([[100, 5], [WIDTH + 100, 300]], "two images"),
         ([[100, 100], [101, 101]], "too close"),
         ([[-5, 100], [300, 100]], "outside"),
         ([[100, 100], [3 * WIDTH + 1, 100]], "outside"),

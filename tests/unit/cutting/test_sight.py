@@ -121,9 +121,9 @@ def _change(path: Path, text: str, by: str) -> None:
     ("change", "said"),
     [
         (lambda f: (f / "depth.png").unlink(), "file is missing"),
-        (lambda f: (f / "depth.png").write_bytes(b"no picture"), "no picture"),
+        (lambda f: (f / "depth.png").write_bytes(b"no image"), "no image"),
         (lambda f: (f / "depth.png").write_bytes((f / "color.png").read_bytes()), "depth has 16 bits"),
-        (lambda f: (f / "camera.json").unlink(), "holds no pictures"),
+        (lambda f: (f / "camera.json").unlink(), "holds no images"),
         (lambda f: (f / "camera.json").write_text("{"), "camera.json"),
         (lambda f: _change(f / "camera.json", '"width": ', '"width": 1'), "the camera"),
         (lambda f: _change(f / "camera.json", '"width": ', '"width": -'), "not a camera"),

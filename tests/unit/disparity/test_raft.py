@@ -261,7 +261,7 @@ def test_the_command_converts_and_overwrites_nothing(tmp_path: Path) -> None:
     assert convert_weights(tmp_path / "raft.pth", made) == 0 and load_network(made).sizes == SMALL
     with pytest.raises(UsageError, match="exists"):
         convert_weights(tmp_path / "raft.pth", made)
-    with pytest.raises(UsageError, match="must end in .safetensors"):
+    with pytest.raises(UsageError, match="written as .safetensors"):
         convert_weights(tmp_path / "raft.pth", tmp_path / "raft.bin")
     with pytest.raises(MissingDependency, match="no such file"):
         convert_weights(tmp_path / "nowhere.pth", tmp_path / "other.safetensors")

@@ -110,7 +110,7 @@ def test_a_calibration_with_the_wrong_sign_is_told_by_its_pictures(tmp_path: Pat
 def test_pictures_and_calibration_that_are_both_exchanged_are_refused_and_the_advice_works(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="left and right are swapped.*further right") as error:
         ingest(write_folder(tmp_path / "log", [(RIGHT, LEFT)], baseline=-BASELINE), tmp_path / "a")
-    assert error.value.hint == "exchange the pictures of left and right"
+    assert error.value.hint == "exchange the images of left and right"
     exchanged = write_folder(tmp_path / "exchanged", [(LEFT, RIGHT)], baseline=-BASELINE)
     assert ingest(exchanged, tmp_path / "b").info.cameras[0].baseline == pytest.approx(BASELINE)
 
@@ -118,7 +118,7 @@ def test_pictures_and_calibration_that_are_both_exchanged_are_refused_and_the_ad
 def test_pictures_that_do_not_tell_leave_it_to_the_options(tmp_path: Path) -> None:
     plain = np.full_like(LEFT, 90)
     log = write_folder(tmp_path / "log", [(plain, plain)], baseline=-BASELINE)
-    with pytest.raises(BadInput, match="the pictures do not tell") as error:
+    with pytest.raises(BadInput, match="the images do not tell") as error:
         ingest(log, tmp_path / "a")
     assert "--baseline 0.1" in str(error.value.hint)
     assert ingest(log, tmp_path / "b", baseline=0.1).info.cameras[0].baseline == 0.1
@@ -198,7 +198,7 @@ def test_one_picture_twice_gives_no_depth_and_a_warning(tmp_path: Path, caplog: 
     sequence = ingest(write_folder(tmp_path / "log", [(LEFT, LEFT)]), tmp_path / "sequence")
     with caplog.at_level("WARNING"):
         made = matched(sequence, tmp_path / "disparity")
-    assert made.outcome == "empty" and "one picture twice" in caplog.text
+    assert made.outcome == "empty" and "one image twice" in caplog.text
 
 
 @pytest.mark.parametrize("wrong", ["rows", "turn", "upside_down"])

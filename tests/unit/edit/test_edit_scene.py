@@ -194,7 +194,7 @@ def test_lines_say_what_commands_said_and_bad_ones_are_refused(room: dict[str, P
     assert scenewright(["edit", "mark", str(edits), "table_2", "fixed", *scene, "--note", '"<' + "x" * 9000]) == 0
     before = edits.read_bytes()
     for words, said in (
-        (["move", "table_2", "--to", "1", "1", "1", "--shift", "1", "1", "1"], "not both"),
+        (["move", "table_2", "--to", "1", "1", "1", "--shift", "1", "1", "1"], "both say where"),
         (["move", "table_2", "--to", "nan", "1", "1"], "edit move"),
         (["model", "table_2", "../../etc"], "edit model"),
         (["joint", "fridge_3", "no such"], "has no joint"),

@@ -165,7 +165,7 @@ def test_what_cannot_be_exported_says_why(sequence: Sequence, tmp_path: Path) ->
         export(plain, tmp_path / "d", unlisted, layout="coco")
     other = write_segments(tmp_path / "other")
     write_panoptic_zip(other.path("panoptic.zip"), [(k, np.ones((4, 4), int)) for k in (0, 1, 3)])
-    with pytest.raises(BadInput, match="4 x 4, its pictures"):
+    with pytest.raises(BadInput, match="4 x 4, its images"):
         export(plain, tmp_path / "e", other, layout="coco")
 
 

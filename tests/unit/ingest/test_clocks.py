@@ -95,7 +95,7 @@ def test_lists_of_two_lengths_without_a_clock_are_refused_and_pairs_are_read(tmp
     log = write_numbered_tum(tmp_path / "log", INTERVALS, pairs=False)
     rows = (log / "depth.txt").read_text().splitlines()
     (log / "depth.txt").write_text("\n".join(rows[1:]))
-    with pytest.raises(BadInput, match="12 pictures and 11 depth images have no common order") as refused:
+    with pytest.raises(BadInput, match="12 images and 11 depth images have no common order") as refused:
         open_log(log, IngestParameters())
     assert "associations.txt in the place of rgb.txt" in (refused.value.hint or "")
     pairs = zip((log / "rgb.txt").read_text().splitlines()[1:], rows[1:], strict=True)
@@ -111,7 +111,7 @@ def test_times_of_plain_images_that_are_none(tmp_path: Path, wrong: str) -> None
     (log / "times.txt").write_text("\n".join(f"{value:.9f}" for value in WRONG[wrong]))
     source = open_log(log, IngestParameters(frame_rate=10.0))
     np.testing.assert_allclose([entry.time for entry in source.entries], np.arange(COUNT) / 10, atol=1e-9)
-    assert any("order in the file, 10 pictures a second" in note for note in source.notes)
+    assert any("order in the file, 10 images a second" in note for note in source.notes)
 
 
 @pytest.mark.parametrize(("settings", "said"), [((), "stamps make"), (("frame_rate=10",), "")])
@@ -202,7 +202,7 @@ def test_a_recorded_desk_is_read_in_its_order_and_in_metres() -> None:
     assert [entry.name for entry in source.entries] == names
     depth = source.entries[0].load().depth
     assert depth is not None and 0.3 < np.quantile(depth[depth > 0], 0.05) / 1000 < 0.8  # a D435 sees from 0.2 m on
-    assert any("stamps make 13,574 pictures a second" in note for note in source.notes)
+    assert any("stamps make 13,574 images a second" in note for note in source.notes)
 
 
 def test_a_recorded_desk_without_intrinsics_is_told_which_to_try() -> None:

@@ -70,7 +70,7 @@ def test_pictures_fit_their_intrinsics_in_the_sequence_and_its_exports(tmp_path:
     (log / "transforms.json").write_text(json.dumps(document))
     sequence = ingest(log, tmp_path / "out")
     assert (sequence.info.camera.width, sequence.info.camera.height) == (CAMERA.width, CAMERA.height)
-    assert any("3 pictures state an EXIF orientation" in note for note in sequence.info.notes) == (
+    assert any("3 images state an EXIF orientation" in note for note in sequence.info.notes) == (
         calibration == "stored"
     )
     with FrameReader(sequence.path("frames.mcap")) as reader:

@@ -101,7 +101,7 @@ def test_poses_of_another_clock_are_spoken_of_with_the_offset(tmp_path: Path) ->
     restamped(log / "groundtruth.txt", "+3600")
     _, posed, notes = opened(log)
     assert posed == 0 and "WARNING: none of the 12 poses of groundtruth.txt is of a frame" in notes
-    assert "begin 3600 s after the frames" in notes and "in the clock of the pictures" in notes
+    assert "begin 3600 s after the frames" in notes and "in the clock of the images" in notes
 
 
 def test_rounded_stamps_are_called_so_and_no_option_is_named(tmp_path: Path) -> None:

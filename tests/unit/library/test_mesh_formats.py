@@ -203,7 +203,7 @@ def test_pictures_that_are_not_read_leave_the_shape(tmp_path: Path) -> None:
     gltf.tree["extensionsRequired"] = ["KHR_texture_basisu"]
     content = read(tmp_path, "a.glb", gltf.bytes())
     assert content.triangles == 2
-    assert "a.glb: pictures need KHR_texture_basisu" in content.findings[0] and "ktxdecompress" in content.findings[0]
+    assert "a.glb: images need KHR_texture_basisu" in content.findings[0] and "ktxdecompress" in content.findings[0]
 
 
 def test_pictures_and_buffers_beside_a_gltf(tmp_path: Path) -> None:
@@ -223,7 +223,7 @@ def test_pictures_and_buffers_beside_a_gltf(tmp_path: Path) -> None:
     content = read(tmp_path, "b.gltf", json.dumps(gltf.tree | buffers))
     assert content.triangles == 2
     assert content.findings == (
-        "b.gltf: picture 'dark%20wood.png' is not in the folder: colours are those of the materials",
+        "b.gltf: image 'dark%20wood.png' is not in the folder: colours are those of the materials",
     )
 
 

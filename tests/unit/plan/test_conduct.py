@@ -17,7 +17,7 @@ from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene, re
 from scenewright.stages.plan import conduct as conduct_module
 from scenewright.stages.plan.action import MotionRequest
 from scenewright.stages.plan.actions.place import MOST_TILT, Place
-from scenewright.stages.plan.conduct import Conduct
+from scenewright.stages.plan.conduct import Anchor, Conduct
 from scenewright.stages.plan.eyes import Room, TrueEyes
 from scenewright.stages.plan.pick_place import Budgets
 from scenewright.stages.plan.refinement import Step
@@ -550,3 +550,26 @@ def test_where_nothing_serves_from_there_it_drives_on_and_looks_again(monkeypatc
     assert [step.name for step in steps] == ["pick"]
     assert conduct.driven == [1.0, 2.0]
     assert asked == [(1.0, True), (1.0, False), (2.0, True)]
+
+
+class Seeing(Conduct):
+    """A look shows what the model already believes."""
+
+    def _look(self, name: str, arguments: tuple[str, ...]) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("drives", "x"), [(True, 1.02), (False, 1.0)])
+def test_a_thing_that_stands_elsewhere_moves_the_base_of_a_robot_that_drives_alone(drives: bool, x: float) -> None:
+    """The cup is seen 2 cm beside where it was: an arm on a table stays, and finds another way to it."""
+    seen = transform_from_yaw(0.0, np.array([0.02, 0.0, 0.0]))
+    description = SimpleNamespace(drives=drives)
+    model = SimpleNamespace(pose=lambda body: seen, text=lambda body: "", description=description)
+    physical = SimpleNamespace(action=-1, held=None)
+    conduct = Seeing(model, Room({}, {}, {}), physical, {}, {}, BUDGETS, np.random.default_rng(0), True, 2)  # type: ignore[arg-type]
+    manipulation = SimpleNamespace(base=np.array([1.0, 0.0, 0.0]), body_from_tool=np.eye(4))
+    step = SimpleNamespace(name="pick", arguments=("cup", "table"), manipulation=manipulation)
+    found = conduct._look_again(step, Anchor("cup", np.eye(4), ""))  # type: ignore[arg-type]
+    assert found is not None
+    np.testing.assert_allclose(found[0], [x, 0.0, 0.0])
+    np.testing.assert_allclose(found[1], np.eye(4))

@@ -154,6 +154,7 @@ def test_an_impossible_goal_is_a_complete_artifact_with_a_named_reason(tmp_path:
     assert last.kind == "goal_unsatisfiable"
     assert {"bottle_7", "table_3", "fridge_2"} <= set(last.objects)
     assert "not all together" in last.message
+    assert result.summary["reason"] == f"{last.kind}: {last.message}; `scenewright explain PLAN outcome` says all"
     for name in ("plan.json", "domain.pddl", "problem.pddl", "plan.txt", "trajectory.npz", "graph.json"):
         assert result.path(name).exists(), name
 

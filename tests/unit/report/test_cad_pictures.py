@@ -6,15 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scenewright.schemas.base import as_transform
-from scenewright.schemas.cad_scene import CadCandidate, CadScene
+from scenewright.schemas.cad_scene import UNEXPLAINED, CadCandidate, CadScene, Explained
 from scenewright.schemas.scene_parts import Relation
 from scenewright.stages.kit.measurement.cad_candidates import candidates_of
 from scenewright.stages.report.candidates import object_views
 from scenewright.stages.report.global_check import CONFLICT, checked_scenes
 from scenewright.stages.report.kinematic_tree import corresponding_trees, read_joints
 from scenewright.stages.report.placed_models import ModelShelf
-from scenewright.stages.report.surfaces import cad_model
+from scenewright.stages.report.surfaces import NOT_EXPLAINED, cad_model
 
 from tests.unit.evaluate.handmade import ROOM, graph_of, make_cad_scene, make_map, model_pose
 from tests.unit.report.models import write_box_model
@@ -195,3 +196,22 @@ def test_chosen_models_wear_the_colours_of_the_map(tmp_path):
     assert np.unique(painted.visual.vertex_colors[:, :3], axis=0).tolist() == [[10, 200, 30]]
     assert np.unique(shelf.mesh(chosen).visual.vertex_colors[:, :3], axis=0).tolist() == [[180, 90, 40]]
     assert np.allclose(painted.bounds, shelf.mesh(chosen).bounds)
+
+
+def test_what_nothing_explains_is_red_and_said(tmp_path):
+    cad = make_scene(tmp_path / "cad")
+    plain = cad_model(cad)
+    trimesh.creation.box((0.3, 0.3, 0.3)).export(cad.path(UNEXPLAINED))
+    marked = cad_model(cad, with_unexplained=True)
+    assert (marked.soup.instance == NOT_EXPLAINED).sum() == 12 and not (plain.soup.instance == NOT_EXPLAINED).any()
+    assert (cad_model(cad).soup.instance != NOT_EXPLAINED).all(), "only where it is asked for"
+    told = [
+        r.model_copy(update={"explained": Explained(area=1.0, by_model=0.6, by_mesh=0.0)})
+        for r in cad.info.replacements
+    ]
+    written = cad.info.model_copy(update={"replacements": tuple(told), "explained_within": 0.024})
+    written.write(cad.path("scene.json"))
+    made = report(tmp_path / "report", SMALL.model_copy(update={"candidates": 0}), cad_scene=CadScene(cad.root))
+    page = parse((made.root / "report.html").read_text())
+    for text in ("Unexplained surface of the map, in red", "Within 24 mm, models explain 60 %", "60 %"):
+        assert text in page.text, text

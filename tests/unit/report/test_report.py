@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import io
 import json
 import os
@@ -16,7 +17,9 @@ import pytest
 from PIL import Image
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.evaluation import Evaluation, MetricsFile, Report
+from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.manifest import InputRecord, Manifest, Provenance
+from scenewright.stages.kit.explaining.sources import sentences, sources_of
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.report.figures import metric_groups
@@ -151,7 +154,20 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
     page = (folder / "report" / "report.html").read_text()
     tags = parse(page)
     ids = {attributes.get("id") for tag, attributes in tags.seen if tag == "section"}
-    assert ids == {"outlook", "walk", "frames", "map", "graph", "cad", "scene", "plan", "figures", "cost", "made"}
+    assert ids == {
+        "outlook",
+        "walk",
+        "frames",
+        "map",
+        "graph",
+        "cad",
+        "scene",
+        "plan",
+        "figures",
+        "cost",
+        "made",
+        "why",
+    }
     links = {attributes["href"] for tag, attributes in tags.seen if tag == "a" and attributes["href"].startswith("#")}
     assert links == {f"#{name}" for name in ids}
     for text in (
@@ -170,8 +186,28 @@ def test_every_section_is_there_and_the_page_is_sound(whole):
         "in cabinet_6",
     ):
         assert text in tags.text, text
-    assert made.summary["sections"] == 11  # the outlook first
+    assert made.summary["sections"] == 12  # the outlook first
     assert Report(folder / "report").json_files["report.json"].read(folder / "report" / "report.json").sections
+
+
+def test_reasons_of_every_entity_are_those_of_explain(whole):
+    folder, _ = whole
+    page = (folder / "report" / "report.html").read_text()
+    section = re.search(r'<section id="why">(.*?)</section>', page, re.S)[1]
+    said = {
+        name: re.findall(r"<li>(.*?)</li>", rows, re.S)
+        for name, rows in re.findall(r"<details><summary>(\S+) <small>.*?<ul>(.*?)</ul></details>", section, re.S)
+    }
+    assert set(said) >= {thing.name for thing in ROOM}
+    told = sentences(sources_of([InteractiveScene(folder / "scene")]))
+    for name, sentences_of_scene in told.items():
+        if name in said:
+            assert set(map(html.escape, sentences_of_scene)) <= set(said[name]), name
+    assert any(reason.startswith("It stands on table_3, with confidence") for reason in said["cup_4"])
+    assert "No model stands for it, its own mesh stays: nothing fits." in said["cup_4"]
+    frame = next(attributes for tag, attributes in parse(page).seen if tag == "iframe")
+    drawn = json.loads(re.search(r'<script id="document"[^>]*>(.*?)</script>', frame["srcdoc"], re.S)[1])
+    assert len(drawn["because"]["cup_4"]) == len(said["cup_4"])
 
 
 def test_the_mask_label_stands_beside_every_figure(whole):

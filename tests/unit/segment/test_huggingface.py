@@ -133,7 +133,7 @@ def test_own_labels_go_first(folders: dict[str, Path]) -> None:
     labels = LabelSet("mine", parse_words(["chair = box", "quark = fridge"], "mine"))
     made = backend(folders["mask2former"], labels=labels, score_threshold=0.3)
     segmenter_of(made)._model = lambda **inputs: crafted("mask2former")
-    assert sorted(names_of(made._make_frame(IMAGE))) == ["box", "fridge"]
+    assert sorted(names_of(made._make_frame(IMAGE))) == ["box", "fridge", "wall"]  # the wall keeps its name
 
 
 def test_words_become_masks(folders: dict[str, Path]) -> None:

@@ -79,6 +79,18 @@ def test_labels_are_matched_by_name_not_by_position() -> None:
         match_labels({0: "LABEL_0", 1: "LABEL_1"}, where="net")
 
 
+def test_a_table_of_ones_own_goes_first_and_the_others_name_the_rest(tmp_path: Path) -> None:
+    """One word of a network's eighty is another class here; the other names keep theirs."""
+    table = tmp_path / "mine.toml"
+    table.write_text('labels = [{ name = "Becher", class = "cup" }, { name = "chair", class = "sofa" }]')
+    names = {1: "Becher", 2: "chair", 3: "dining table", 4: "quark"}
+    matched = match_labels(names, read_label_file(table), where="net")
+    assert {number: label.class_name for number, label in matched.labels.items()} == {1: "cup", 2: "sofa", 3: "table"}
+    assert (matched.set_name, matched.unknown) == ("mine", ("quark",))
+    numbered = match_labels({5: "tvmonitor"}, read_label_file(table), load_label_set("pascal-voc"), where="net")
+    assert numbered.labels[5].class_name == "monitor"
+
+
 def test_a_name_comes_before_what_others_are_also_called() -> None:
     """ADE20K calls plates what the vocabulary had bowls for, before it had plates."""
     label = load_label_set("scenewright").find("plate")

@@ -132,7 +132,7 @@ def test_ways_to_write_polygons(outline: Any, count: int) -> None:
         ([[1, 2, 3, 4, 5]], {}, "mask 1: one of its polygons is not a list of numbers in pairs"),
         ([[1, 2, 3, 4, "5", 6]], {}, "numbers in pairs"),
         ([[0, 0, 200, 0, 200, 90]], {}, r"reaches to \(200, 90\), the frame has 64x48 pixels"),
-        ([[0, 0, 60, 0, 60, 40]], {"width": 128, "height": 96}, "of a picture of 128x96, the frame has 64x48"),
+        ([[0, 0, 60, 0, 60, 40]], {"width": 128, "height": 96}, "of an image of 128x96, the frame has 64x48"),
         ([[0, 0, 1e8, 0, 1e8, -1e8]], {"width": WIDTH, "height": HEIGHT}, "pixels long"),
     ],
 )
@@ -324,7 +324,7 @@ def test_folders_that_say_nothing(tmp_path: Path) -> None:
         (tmp_path / folder).mkdir()
         for k in range(2):
             cv2.imwrite(str(tmp_path / folder / f"{k}.png"), TRUE["cup"].astype(np.uint8))
-    with pytest.raises(BadInput, match="nothing says whether 'a1' or '0' is a picture"):
+    with pytest.raises(BadInput, match="nothing says whether 'a1' or '0' is an image"):
         opened(tmp_path)
 
 

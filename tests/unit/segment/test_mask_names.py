@@ -76,7 +76,7 @@ def test_names_of_an_export_are_not_those_of_a_log() -> None:
 def test_masks_counted_from_0_for_pictures_counted_from_1() -> None:
     names = [f"frame_{k:05d}" for k in range(COUNT)]
     matching = match(names, sources("frame_{:05d}.jpg"))
-    assert matching.places == {k: k for k in range(COUNT)} and "'frame_00000' is of no picture" in matching.warnings[0]
+    assert matching.places == {k: k for k in range(COUNT)} and "'frame_00000' is of no image" in matching.warnings[0]
     by_name = match(names, sources("frame_{:05d}.jpg"), named_like="log")
     assert by_name.places == {k: k + 1 for k in range(COUNT - 1)} and "left out: frame_00000" in by_name.warnings[0]
 

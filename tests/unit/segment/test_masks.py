@@ -482,7 +482,7 @@ def test_the_text_is_that_of_pycocotools() -> None:
     ("encoding", "message"),
     [
         ({"size": [4, 5], "counts": [5, 20]}, "adds up to 25 pixels"),
-        ({"size": [4, 5], "counts": [5, 10**9]}, "adds up to more than the picture"),
+        ({"size": [4, 5], "counts": [5, 10**9]}, "adds up to more than the image"),
         ({"size": [4, 5], "counts": [25, -5]}, "a run of -5"),
         ({"size": [4, 5], "counts": [5, 2]}, "adds up to 7"),
         ({"size": [4, 5], "counts": []}, "adds up to 0"),
@@ -601,7 +601,7 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         beyond: "1 of 3 masks are of frames outside the sequence: 000009 (name 9)",
         bomb: "unpacks to more than",
         pickled: "holds object",
-        colours: "a colour image without a table of its classes",
+        colours: "a colour image without a table of classes",
         text: "holds no masks that are read here",
     }
     for write, message in cases.items():

@@ -142,14 +142,14 @@ def of_several_pictures(path: Path) -> None:
 def test_inputs_that_are_not_one_picture(tmp_path: Path) -> None:
     weights = end_to_end(tmp_path / "net.onnx")
     of_several_pictures(weights)
-    with pytest.raises(BadInput, match="takes 4 pictures at a time") as caught:
+    with pytest.raises(BadInput, match="takes 4 images at a time") as caught:
         found_by(weights)
     assert "batch=1" in (caught.value.hint or "")
     sidecar = tmp_path / "net.toml"
     told = 'layout = "yolo-end-to-end"\nsize = [32, 32]\n[outputs]\npredictions = "output0"\nprototypes = "output1"\n'
     sidecar.write_text(told)
     weights = end_to_end(tmp_path / "net.onnx")
-    with pytest.raises(BadInput, match=r"takes pictures of \(64, 64\), the sidecar says \(32, 32\)") as caught:
+    with pytest.raises(BadInput, match=r"takes images of \(64, 64\), the sidecar says \(32, 32\)") as caught:
         found_by(weights, sidecar=sidecar)
     assert caught.value.hint == "leave `size` out of the sidecar"
     sidecar.write_text(told.replace("size = [32, 32]\n", ""))

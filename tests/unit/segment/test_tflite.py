@@ -195,7 +195,7 @@ def test_instances_over_a_semantic_network_say_who_saw_them(tmp_path: Path, monk
         ({"a": np.zeros((1, 1000), np.float32)}, {}, "of no known layout"),
         ({"a": np.zeros((1, 48, 64), np.float32)}, {"shape": (1, 1000)}, "not one image"),
         ({"a": np.zeros((1, 48, 64), np.float32)}, {"kind": np.int64}, "not one image"),
-        ({"a": np.zeros((4, 48, 64), np.int32)}, {"shape": (4, 48, 64, 3)}, "4 pictures at a time"),
+        ({"a": np.zeros((4, 48, 64), np.int32)}, {"shape": (4, 48, 64, 3)}, "4 images at a time"),
     ],
 )
 def test_networks_of_another_kind_are_refused(

@@ -132,7 +132,7 @@ def test_a_splat_without_held_out_views_is_an_empty_comparison(made: tuple[Seque
     [
         ({"with_pose": False}, "0 frames have a pose"),
         ({"with_pose": True, "with_color": False}, "no colour"),
-        ({"with_pose": True, "blank": range(13)}, "all 10 pictures are dark"),
+        ({"with_pose": True, "blank": range(13)}, "all 10 images are dark"),
     ],
 )
 def test_bad_input_is_said_in_one_line(options: dict[str, object], message: str, tmp_path: Path) -> None:

@@ -80,7 +80,7 @@ def test_masks_of_files_are_read_and_checked(folder: Path, tmp_path: Path, capsy
     blank = np.zeros((960, 1280), np.uint8)
     for side in ("left", "right"):
         cv2.imwrite(str(masks / f"000000_{side}.png"), blank[:100])
-    assert "1280 x 100 pixels, the pictures have 1280 x 960" in refused(capsys, 3, *words)
+    assert "1280 x 100 pixels, the images have 1280 x 960" in refused(capsys, 3, *words)
     for side in ("left", "right"):
         cv2.imwrite(str(masks / f"000000_{side}.png"), blank)
     assert "sees 0 pixels of needle" in refused(capsys, 4, *words)

@@ -5,21 +5,16 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
-from scenewright.cli.explaining.cad_reasons import joint_reason, replacement_reasons
-from scenewright.cli.explaining.explaining import explain, sentences
-from scenewright.cli.explaining.graph_reasons import node_reasons
-from scenewright.cli.explaining.map_reasons import entity_reasons, plane_reasons
-from scenewright.cli.explaining.plan_reasons import link_reasons
-from scenewright.cli.explaining.reason import Reason, edit_reasons
-from scenewright.cli.explaining.scene_reasons import body_reasons, settled_reason
+from scenewright.cli.explaining import explain, sentences
 from scenewright.cli.main import run
 from scenewright.cli.viewing.view import view_artifact
 from scenewright.schemas.base import as_transform
-from scenewright.schemas.cad_scene import CadCandidate, JointEvidence, Replacement
+from scenewright.schemas.cad_scene import CadCandidate, Explained, JointEvidence, Replacement, Tried
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.edits import AppliedEdit, AppliedEditsFile
 from scenewright.schemas.errors import BadInput
@@ -36,6 +31,12 @@ from scenewright.schemas.panoptic_map import (
 from scenewright.schemas.plan import PlanFile, PlannedAction, TriedPlan
 from scenewright.schemas.scene_parts import Box, Joint, Relation
 from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.kit.explaining.cad_reasons import joint_reason, replacement_reasons
+from scenewright.stages.kit.explaining.graph_reasons import node_reasons
+from scenewright.stages.kit.explaining.map_reasons import entity_reasons, plane_reasons
+from scenewright.stages.kit.explaining.plan_reasons import link_reasons
+from scenewright.stages.kit.explaining.reason import Reason, edit_reasons
+from scenewright.stages.kit.explaining.scene_reasons import body_reasons, settled_reason
 from scenewright.stages.kit.tasks.pddl import parse_domain, parse_problem
 
 from tests.unit.viewing.artifacts import seal
@@ -237,10 +238,36 @@ def test_a_node_says_what_carries_it_and_by_what_evidence(name: str, expected: l
     assert said(node_reasons(GRAPH)[name]) == expected
 
 
-def candidate(model: str, error: float = 0.012, **more: str) -> CadCandidate:
+def candidate(model: str, error: float = 0.012, **more: Any) -> CadCandidate:
     return CadCandidate(
         model_id=model, scale=1.0, world_from_model=POSE, matching_error=0.5, alignment_error=error, **more
     )
+
+
+def test_a_thing_says_what_was_tried_and_what_is_explained() -> None:
+    entry = Replacement(
+        node="object_3",
+        decision="cad",
+        reason="by its shape a stool: 12 mm off, nothing else fits",
+        chosen=candidate("stool_00", score=0.012, explained=0.91),
+        alternatives=(candidate("stool_01", 0.02, score=0.025, explained=0.7),),
+        tries=(
+            Tried(way="library", because="the library has no model of class object"),
+            Tried(way="by_shape", because="", model_id="stool_00", score=0.012),
+        ),
+        explained=Explained(area=0.4, by_model=0.91, by_mesh=0.0),
+        stays="free: it is furniture and stands by its own weight",
+    )
+    rows = said(list(replacement_reasons(entry)))
+    assert rows[2:] == [
+        "Models of the library of its class: nothing new (the library has no model of class object).",
+        "Models of the class that its shape tells: stool_00.",
+        "Of the 0.40 m² that were seen of it, the model explains 91 %.",
+        "Other valid models, with their distance from what was seen: stool_01 (20 mm, costs 13 mm more, explains "
+        "70 %).",
+        "Nothing on it opens: the model has no joint.",
+        "As far as this scene says, it is free: it is furniture and stands by its own weight.",
+    ]
 
 
 def test_a_model_says_why_it_and_not_another() -> None:

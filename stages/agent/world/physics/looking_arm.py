@@ -27,7 +27,8 @@ def looking_arm(beliefs: Beliefs) -> np.ndarray:
     robot = beliefs.description
     if abs(beliefs.chain.fixed[0][2, 2]) < VERTICAL:
         raise BadInput(
-            f"robot {robot.name}: its first joint does not turn about the vertical, so it cannot look around"
+            f"robot {robot.name}: its first joint does not turn about the vertical, so it cannot look around",
+            hint="take an arm whose first joint does",
         )
     if robot.look is not None:
         return robot.look
@@ -37,9 +38,9 @@ def looking_arm(beliefs: Beliefs) -> np.ndarray:
         if arm is not None:
             return arm
     raise BadInput(
-        f"robot {robot.name}: found no free arm with the hand {np.degrees(DOWN):.0f} degrees down, "
-        f"{min(AHEAD)} to {max(AHEAD)} m ahead and {min(HEIGHTS)} to {max(HEIGHTS)} m high",
-        hint="give it in the description: look = [joint values], or another pedestal_height",
+        f"robot {robot.name}: no posture has the hand {np.degrees(DOWN):.0f} degrees down, "
+        f"{min(AHEAD)} to {max(AHEAD)} m ahead, {min(HEIGHTS)} to {max(HEIGHTS)} m high",
+        hint="give its description look = [joint values], or another pedestal_height",
     )
 
 

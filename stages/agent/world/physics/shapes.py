@@ -11,7 +11,7 @@ from scenewright.schemas.apartment import Thing
 from scenewright.schemas.base import Model, as_transform, as_vector
 from scenewright.schemas.interactive_scene import SceneBody
 from scenewright.schemas.outside import file_toml
-from scenewright.schemas.places import data_file
+from scenewright.schemas.places import REINSTALL, data_file
 from scenewright.schemas.scene_parts import Box, Joint
 from scenewright.stages.kit.simulation.shapes import paint
 
@@ -66,7 +66,7 @@ class Shape(Model):
 @cache
 def shapes() -> dict[str, Shape]:
     """Return the committed shapes by class."""
-    return {label: Shape.model_validate(entry) for label, entry in file_toml(SHAPES).items()}
+    return {label: Shape.model_validate(entry) for label, entry in file_toml(SHAPES, hint=REINSTALL).items()}
 
 
 def shape_of(thing: Thing) -> Shape:

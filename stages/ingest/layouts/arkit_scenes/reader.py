@@ -127,7 +127,7 @@ def _pincam(path: Path) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if len(numbers) != 6 or not all(1 <= value <= 1e5 for value in numbers[:2]):
-        raise BadInput(f"{path}: is not w h fx fy cx cy")
+        raise BadInput(f"{path}: is not w h fx fy cx cy", hint="download that asset of the scene again")
     return numbers
 
 

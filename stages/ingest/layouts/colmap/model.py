@@ -38,6 +38,7 @@ MODELS = {
 }
 """Number in the file -> name, number of parameters."""
 PARAMETERS = dict(MODELS.values())
+AGAIN = "copy the model again, as COLMAP wrote it"
 LARGEST_FILE = 4_000_000_000
 """Bytes of images.bin that are walked over; most of them are observations, which are skipped."""
 LONGEST_NAME = 4096
@@ -91,7 +92,10 @@ def read_model(folder: Path) -> SparseModel:
         cameras, images = _text_cameras(folder / "cameras.txt"), _text_images(folder / "images.txt")
     for image in images:
         if image.camera not in cameras:
-            raise BadInput(f"{folder}: image {image.name!r:.80} is of camera {image.camera}, which the model has not")
+            raise BadInput(
+                f"{folder}: image {image.name!r:.80} is of camera {image.camera}, which the model has not",
+                hint="copy cameras and images of one model",
+            )
     return SparseModel(folder, cameras, tuple(images))
 
 
@@ -101,7 +105,7 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         size = path.stat().st_size
         if size > LARGEST_FILE:
-            raise BadInput(f"{path}: {size} bytes, more than {LARGEST_FILE}")
+            raise BadInput(f"{path}: {size} bytes, more than {LARGEST_FILE}", hint="give a model of fewer images")
         self.path = path
         self.data = np.memmap(path, np.uint8, "r") if size else np.zeros(0, np.uint8)
         self.place = 0
@@ -114,12 +118,12 @@ class _Reader:
         window = self.data[self.place : self.place + LONGEST_NAME].tobytes()
         end = window.find(b"\0")
         if end < 0:
-            raise BadInput(f"{self.path}: byte {self.place}: a name does not end")
+            raise BadInput(f"{self.path}: byte {self.place}: a name does not end", hint=AGAIN)
         self.place += end + 1
         try:
             return window[:end].decode("utf-8")
         except UnicodeDecodeError:
-            raise BadInput(f"{self.path}: byte {self.place}: a name is not UTF-8") from None
+            raise BadInput(f"{self.path}: byte {self.place}: a name is not UTF-8", hint=AGAIN) from None
 
     def skip(self, count: int) -> None:
         self._check(count)
@@ -130,7 +134,7 @@ class _Reader:
         number = self.take("Q")[0]
         remaining = len(self.data) - self.place
         if number * smallest > remaining:
-            raise BadInput(f"{self.path}: declares {number} {what}, but only {remaining} bytes follow")
+            raise BadInput(f"{self.path}: declares {number} {what}, but only {remaining} bytes follow", hint=AGAIN)
         return number
 
     def _bytes(self, count: int) -> bytes:
@@ -149,7 +153,10 @@ def _binary_cameras(path: Path) -> dict[int, ModelCamera]:
     for _ in range(reader.count(24, "cameras")):
         number, model, width, height = reader.take("iiQQ")
         if model not in MODELS:
-            raise BadInput(f"{path}: camera {number} is of model {model}, which is not known here")
+            raise BadInput(
+                f"{path}: camera {number} is of model {model}, which is not known here",
+                hint="run COLMAP's image_undistorter and give its output folder",
+            )
         name, count = MODELS[model]
         cameras[number] = _camera(name, width, height, reader.take(f"{count}d"), f"{path}: camera {number}")
     return cameras
@@ -179,9 +186,9 @@ def _text_cameras(path: Path) -> dict[int, ModelCamera]:
             number, model, width, height = int(fields[0]), fields[1], int(fields[2]), int(fields[3])
             values = tuple(float(field) for field in fields[4:])
         except (IndexError, ValueError):
-            raise BadInput(f"{where}: expected an id, a model, width, height and parameters") from None
+            raise BadInput(f"{where}: expected an id, a model, width, height and parameters", hint=AGAIN) from None
         if len(values) != PARAMETERS.get(model, len(values)):
-            raise BadInput(f"{where}: {model} has {PARAMETERS[model]} parameters, not {len(values)}")
+            raise BadInput(f"{where}: {model} has {PARAMETERS[model]} parameters, not {len(values)}", hint=AGAIN)
         cameras[number] = _camera(model, width, height, values, where)
     return cameras
 
@@ -202,7 +209,9 @@ def _text_images(path: Path) -> list[ModelImage]:
             int(fields[0])
             pose, camera, name = [float(field) for field in fields[1:8]], int(fields[8]), fields[9].strip()
         except (IndexError, ValueError):
-            raise BadInput(f"{path}: line {line}: expected id, qw qx qy qz, tx ty tz, camera, name") from None
+            raise BadInput(
+                f"{path}: line {line}: expected id, qw qx qy qz, tx ty tz, camera, name", hint=AGAIN
+            ) from None
         images.append(ModelImage(name, camera, _world_from_camera(tuple(pose))))
         observations_follow = True
     return images
@@ -210,9 +219,9 @@ def _text_images(path: Path) -> list[ModelImage]:
 
 def _camera(model: str, width: int, height: int, parameters: tuple[float, ...], where: str) -> ModelCamera:
     if not (1 <= width <= LARGEST_SIZE and 1 <= height <= LARGEST_SIZE):
-        raise BadInput(f"{where}: images of {width}x{height} pixels")
+        raise BadInput(f"{where}: images of {width}x{height} pixels", hint=AGAIN)
     if not all(map(math.isfinite, parameters)):
-        raise BadInput(f"{where}: parameters {list(parameters)} are not finite")
+        raise BadInput(f"{where}: parameters {list(parameters)} are not finite", hint=AGAIN)
     return ModelCamera(model, (width, height), parameters)
 
 

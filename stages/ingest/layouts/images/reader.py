@@ -85,7 +85,10 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     cannot be paired."""
     images = find_images(root)
     if images is None:
-        raise BadInput(f"{root}: holds no images in color/, left/ and right/, or with names that say what they are")
+        raise BadInput(
+            f"{root}: holds no images in color/, left/ and right/, or with names that say what they are",
+            hint="name the folders or the images so",
+        )
     video = VideoFrames(images.video) if images.video else None
     names = images.names if video is None else tuple(f"frame {index}" for index in range(video.count))
     require_exr(path.name for path in images.depths if path)
@@ -192,7 +195,12 @@ def _eyes(
     if not width * height:  # no image can be decoded, so there will be no frame; the log is described all the same
         matrix = calibration.left.K
         fx, _, cx, _, fy, cy, *_ = matrix
-        return _Eyes(Lens(Camera.of_outside(root, width=0, height=0, fx=fx, fy=fy, cx=cx, cy=cy), (0, 0)))
+        return _Eyes(
+            Lens(
+                Camera.of_outside(root, width=0, height=0, fx=fx, fy=fy, cx=cx, cy=cy, hint="correct the calibration"),
+                (0, 0),
+            )
+        )
     sized = [_with_size(each, width, height) for each in (calibration.left, calibration.right) if each is not None]
     if has_right and len(sized) < 2:
         raise BadInput(f"{root}: the calibration is of one camera, the images are pairs", hint=PAIR_HINT)
@@ -212,7 +220,7 @@ def _eyes(
     baseline, unit_note = (baseline, None) if given is not None else in_metres(baseline, str(root))
     notes = [f"stereo pair, baseline {abs(baseline) * 1000:.4g} mm", *([unit_note] if unit_note else ()), *left.notes]
     if side_by_side:
-        notes.append("each picture holds both eyes side by side, left first")
+        notes.append("each image holds both eyes side by side, left first")
     if calibration.disparity_offset:
         notes.append(
             f"right image moved by doffs {calibration.disparity_offset:g} pixels, so that one camera describes both: "

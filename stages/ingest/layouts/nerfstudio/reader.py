@@ -96,7 +96,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         return replica.open_source(path, parameters, rule)
     document = read_json(file)
     if not isinstance(document, dict) or not isinstance(document.get("frames"), list):
-        raise BadInput(f"{file}: has no list of frames")
+        raise BadInput(f"{file}: has no list of frames", hint="write them under `frames`, as nerfstudio does")
     frames = sorted(_frames(document, file), key=lambda frame: natural_key(frame.name))
     stamped = all(frame.time is not None for frame in frames)
     column = None
@@ -111,7 +111,9 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     unit_key = next((key for key in UNIT_KEYS if key in document), UNIT_KEYS[0])
     default_unit = _number(document, unit_key, str(file), DEFAULT_UNIT)
     if not default_unit > 0:
-        raise BadInput(f"{file}: {unit_key} {default_unit:g} is not positive")
+        raise BadInput(
+            f"{file}: {unit_key} {default_unit:g} is not positive", hint="write metres a unit: 0.001 for millimetres"
+        )
     unstated = [] if unit_key in document else [frame.depth for frame in frames]
     stored, unit_note = depth_form(parameters, 1 / default_unit, unstated)
     recorded, notes_of_options = _recorded_cameras(frames, has_depth, parameters)
@@ -143,7 +145,7 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if group.name in chosen
     ]
     if not cameras:
-        raise BadInput(f"{file}: has no frames")
+        raise BadInput(f"{file}: has no frames", hint="write them under `frames`, as nerfstudio does")
     lenses = sorted({recording.lens.words for recording in recorded if not recording.lens.is_pinhole})
     notes = (
         f"intrinsics read from {file.name}",
@@ -177,7 +179,7 @@ def _transforms(path: Path) -> Path | None:
     if path.is_dir():
         return next((path / name for name in NAMES if (path / name).is_file()), None)
     if path.suffix.lower() == ".json" and path.is_file():
-        with opened(path) as file:
+        with opened(path, hint="check its permissions") as file:
             start = file.read(1_000_000)
         return path if b'"frames"' in start and b'"transform_matrix"' in start else None
     return None
@@ -189,7 +191,7 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
     for index, fields in enumerate(document["frames"]):
         where = f"{file}: frame {index}"
         if not isinstance(fields, dict):
-            raise BadInput(f"{where}: is not an object")
+            raise BadInput(f"{where}: is not an object", hint="write an object with file_path and transform_matrix")
         depth = fields.get("depth_file_path")
         if depth is None and (root / str(fields.get("depth_path"))).is_file():  # NeRFCapture names files it never wrote
             depth = fields["depth_path"]
@@ -232,7 +234,7 @@ def _pose(value: Any) -> tuple[np.ndarray | None, str | None]:
 def _number(fields: dict[str, Any], name: str, where: str, default: float | None = None, largest: float = 1e9) -> float:
     value = fields.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= largest:
-        raise BadInput(f"{where}: {name} = {value!r:.40} is not a number")
+        raise BadInput(f"{where}: {name} = {value!r:.40} is not a number", hint="correct it")
     return float(value)
 
 
@@ -271,7 +273,7 @@ def _read_stated(frame: _Frame) -> _Stated:
     if fields.get("w") is not None and fields.get("h") is not None:
         width, height = _number(fields, "w", where), _number(fields, "h", where)
         if not (1 <= width <= LARGEST_SIZE and 1 <= height <= LARGEST_SIZE):
-            raise BadInput(f"{where}: images of {width:g}x{height:g} pixels")
+            raise BadInput(f"{where}: images of {width:g}x{height:g} pixels", hint="write w and h in pixels")
         size = (round(width), round(height))
     return _Stated(
         size,
@@ -328,7 +330,9 @@ def _world_from_saved(
     """Return a function from a pose in the file to world_from_camera in the original world, and notes."""
     scale = _number(document, "applied_scale", str(file), 1.0)
     if not scale > 0:
-        raise BadInput(f"{file}: applied_scale {scale:g} is not positive")
+        raise BadInput(
+            f"{file}: applied_scale {scale:g} is not positive", hint="write the factor over 0, or leave it out"
+        )
     applied = np.eye(4)
     if document.get("applied_transform") is not None:
         matrix, problem = _pose(document["applied_transform"])

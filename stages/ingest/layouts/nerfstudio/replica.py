@@ -25,6 +25,7 @@ from scenewright.stages.ingest.source import Entry, FrameFiles, LogSource, Sourc
 from scenewright.stages.kit.formats.trajectories import number_rows
 
 TRAJECTORY, RESULTS, CAMERA = "traj.txt", "results", "cam_params.json"
+AS_WRITTEN = 'write it so: {"camera": {"w", "h", "fx", "fy", "cx", "cy", "scale"}}'
 UNITS_PER_METRE = 6553.5
 """Stored depth per metre where the file does not say; Replica's own camera parameters."""
 RENDERED = ((1200, 680), (600.0, 600.0, 599.5, 339.5))
@@ -87,13 +88,15 @@ def _read_camera(path: Path, size: tuple[int, int] | None) -> tuple[Camera, floa
     document = read_json(path)
     fields = document.get("camera", document) if isinstance(document, dict) else None
     if not isinstance(fields, dict):
-        raise BadInput(f"{path}: has no camera")
+        raise BadInput(f"{path}: has no camera", hint=AS_WRITTEN)
     try:
         stated = (int(fields["w"]), int(fields["h"]))
         numbers = [fields[name] for name in ("fx", "fy", "cx", "cy")]
         units = float(fields.get("scale", UNITS_PER_METRE))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise BadInput(f"{path}: no camera with w, h, fx, fy, cx, cy ({type(error).__name__}: {error})") from None
+        raise BadInput(
+            f"{path}: no camera with w, h, fx, fy, cx, cy ({type(error).__name__}: {error})", hint=AS_WRITTEN
+        ) from None
     if not 0 < units < 1e9 or not all(0 < value < 1e5 for value in stated):
-        raise BadInput(f"{path}: size {stated[0]}x{stated[1]} or scale {units:g} is impossible")
+        raise BadInput(f"{path}: size {stated[0]}x{stated[1]} or scale {units:g} is impossible", hint=AS_WRITTEN)
     return resized_camera(pinhole(numbers, stated, str(path)), size, str(path)), units

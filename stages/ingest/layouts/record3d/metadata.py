@@ -12,6 +12,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.ingest.folders.frame_loading import Size
 from scenewright.stages.ingest.folders.phone_frames import OPENGL_FROM_OPENCV, numbers_of
+from scenewright.stages.ingest.layouts.record3d.recording import AGAIN
 from scenewright.stages.kit.formats.stamps import exact_stamps
 from scenewright.stages.kit.formats.trajectories import transform_from_numbers
 
@@ -62,7 +63,7 @@ class Metadata:
 def read_metadata(document: Any, where: str) -> Metadata:
     """Return what a document says. Raises BadInput, beginning with `where`, for one of another kind."""
     if not isinstance(document, dict):
-        raise BadInput(f"{where}: is not an object with K and poses")
+        raise BadInput(f"{where}: is not an object with K and poses", hint=AGAIN)
     matrix = _rows(document, "K", 9, where, whole=True)[0]
     columns = matrix if matrix[6] or matrix[7] else tuple(np.reshape(matrix, (3, 3)).T.reshape(9).tolist())
     rate = document.get("fps")
@@ -88,11 +89,11 @@ def _rows(document: dict[str, Any], key: str, width: int, where: str, *, whole: 
     try:
         numbers = [tuple(float(number) for number in row) for row in rows]
     except (TypeError, ValueError, OverflowError):
-        raise BadInput(f"{where}: {key} holds a value that is not a number") from None
+        raise BadInput(f"{where}: {key} holds a value that is not a number", hint=AGAIN) from None
     wrong = next((k for k, row in enumerate(numbers) if len(row) != width), None)
     if wrong is not None:
         place = "" if whole else f", frame {wrong}"
-        raise BadInput(f"{where}: {key}{place} has {len(numbers[wrong])} numbers, expected {width}")
+        raise BadInput(f"{where}: {key}{place} has {len(numbers[wrong])} numbers, expected {width}", hint=AGAIN)
     return tuple(numbers)
 
 
@@ -101,5 +102,7 @@ def _size(document: dict[str, Any], width: str, height: str, where: str) -> Size
         return None
     size = numbers_of([document[width], document[height]], 2)
     if size is None or not all(1 <= value <= LARGEST_SIZE for value in size):
-        raise BadInput(f"{where}: {width}, {height} = {document[width]!r:.20}, {document[height]!r:.20} are no size")
+        raise BadInput(
+            f"{where}: {width}, {height} = {document[width]!r:.20}, {document[height]!r:.20} are no size", hint=AGAIN
+        )
     return round(size[0]), round(size[1])

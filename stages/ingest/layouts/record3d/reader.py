@@ -16,7 +16,7 @@ from scenewright.stages.ingest.folders.frame_loading import FrameReads, Size
 from scenewright.stages.ingest.folders.lzfse_blocks import declared_size, require_lzfse, unpacked
 from scenewright.stages.ingest.folders.phone_frames import PhoneFrame, PhoneLog, phone_source
 from scenewright.stages.ingest.layouts.record3d.metadata import Metadata, read_metadata
-from scenewright.stages.ingest.layouts.record3d.recording import Recording, open_recording, recording_at
+from scenewright.stages.ingest.layouts.record3d.recording import AGAIN, Recording, open_recording, recording_at
 from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.source import FrameFiles, LogSource, StreamInfo, Unusable
 from scenewright.stages.kit.formats.image_headers import image_size
@@ -56,7 +56,7 @@ def _log(recording: Recording, metadata: Metadata, parameters: IngestParameters)
     depth_size = _depth_size(recording, packed, exported, metadata, picture_size)
     full_size = metadata.picture_size or picture_size
     if full_size is None:
-        raise BadInput(f"{recording.root}: has no pictures, and its metadata states no w and h")
+        raise BadInput(f"{recording.root}: has no images, and its metadata states no w and h", hint=AGAIN)
     frames = []
     numbers = sorted({*colors, *packed, *exported})
     for number in numbers:
@@ -98,7 +98,7 @@ def _log(recording: Recording, metadata: Metadata, parameters: IngestParameters)
             *_missing_note(len(numbers), len(metadata.poses)),
         ),
         streams=(
-            *((StreamInfo("pictures", "color", "files", count=len(colors)),) if colors else ()),
+            *((StreamInfo("images", "color", "files", count=len(colors)),) if colors else ()),
             *((StreamInfo("depth", "depth", "files", count=len(packed or exported)),) if packed or exported else ()),
             *((StreamInfo("confidence", "other", "files", count=len(levels)),) if levels else ()),
             StreamInfo("poses", "pose", "metadata", count=len(metadata.poses)),

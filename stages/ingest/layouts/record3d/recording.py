@@ -85,7 +85,7 @@ class ArchivedRecording(Recording):
 
     def __init__(self, path: Path) -> None:
         self.root = path
-        self._file = opened(path)
+        self._file = opened(path, hint=AGAIN)
         try:
             with zip_errors(path, AGAIN):
                 self._archive = zipfile.ZipFile(self._file)
@@ -99,7 +99,7 @@ class ArchivedRecording(Recording):
             try:
                 data = self._archive.read(find_entry(self._archive, "metadata", LARGEST_METADATA))
             except KeyError:
-                raise BadInput(f"{self.root}: holds no file `metadata`") from None
+                raise BadInput(f"{self.root}: holds no file `metadata`", hint=AGAIN) from None
         return json_of(data, f"{self.root}: metadata", hint=AGAIN)
 
     def names(self) -> list[str]:

@@ -29,6 +29,7 @@ from scenewright.stages.kit.formats.trajectories import read_open3d_log
 COLOR_FOLDERS = ("image", "color", "rgb")
 TRAJECTORY = "trajectory.log"
 INTRINSICS = ("camera_intrinsic.json", "intrinsic.json")
+WRITTEN = "write it with Open3D: open3d.io.write_pinhole_camera_intrinsic"
 PRIMESENSE = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5}
 """Open3D's `PinholeCameraIntrinsicParameters.PrimeSenseDefault` for 640 x 480 [px]."""
 
@@ -56,7 +57,10 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
             hint="the format pairs images by order: add the missing ones, or delete their partners",
         )
     if len(poses) > len(depths):
-        raise BadInput(f"{root / TRAJECTORY}: {len(poses)} poses for {len(depths)} images")
+        raise BadInput(
+            f"{root / TRAJECTORY}: {len(poses)} poses for {len(depths)} images",
+            hint="remove the poses that are too many",
+        )
     paired: list[Path | None] = [*colors] if colors else [None] * len(depths)
     entries = tuple(
         Entry(
@@ -97,9 +101,12 @@ def _read_intrinsics(path: Path, size: tuple[int, int] | None) -> Camera:
         width, height = int(document["width"]), int(document["height"])
         fx, fy, cx, cy = matrix[0], matrix[4], matrix[6], matrix[7]
     except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
-        raise BadInput(f"{path}: no Open3D intrinsics ({type(error).__name__}: {error})") from None
+        raise BadInput(f"{path}: no Open3D intrinsics ({type(error).__name__}: {error})", hint=WRITTEN) from None
     if not all(map(math.isfinite, matrix)) or fx <= 0 or fy <= 0 or min(width, height) < 1:
-        raise BadInput(f"{path}: focal lengths {fx:g}, {fy:g} are not positive")
+        raise BadInput(f"{path}: focal lengths {fx:g}, {fy:g} are not positive", hint=WRITTEN)
     if size is not None and size != (width, height):
-        raise BadInput(f"{path}: is for {width}x{height}, the depth images are {size[0]}x{size[1]}")
-    return Camera.of_outside(path, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+        raise BadInput(
+            f"{path}: is for {width}x{height}, the depth images are {size[0]}x{size[1]}",
+            hint="give the intrinsics of the depth images",
+        )
+    return Camera.of_outside(path, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, hint=WRITTEN)

@@ -62,7 +62,10 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     picture_size = color_image_size(colors.values())
     full_size = full_picture_size(usual, (picture_size, RECORDED))
     if full_size is None:
-        raise BadInput(f"{root}: the intrinsics are not those of pictures of {size_words(picture_size or RECORDED)}")
+        raise BadInput(
+            f"{root}: the intrinsics are not those of images of {size_words(picture_size or RECORDED)}",
+            hint="export `All Data` from the app again",
+        )
     shown = sorted(colors) if colors else sorted(documents)
     frames = []
     for number in shown:
@@ -85,7 +88,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
                 stamp=None if time is None else round(time[0] * 1e9),
             )
         )
-    rare = (f"{len(documents)} frames were recorded, those with a picture are read",) if colors else ()
+    rare = (f"{len(documents)} frames were recorded, those with an image are read",) if colors else ()
     log = PhoneLog(
         where=str(root),
         frames=frames,

@@ -36,6 +36,7 @@ from scenewright.stages.kit.formats.trajectories import read_matrix, read_text
 
 INTRINSIC_FILES = ("intrinsic/intrinsic_depth.txt", "intrinsic_depth.txt")
 INFO = "_info.txt"
+AGAIN = "export the intrinsics with the SensReader"
 INFO_LINE = re.compile(r"\s*(m_\w+)\s*=\s*(.*\S)")
 
 
@@ -152,9 +153,7 @@ def _calibration(root: Path, depth_size: tuple[int, int] | None, color_size: tup
         units = _info_number(fields, "m_depthShift", where)
         sizes = {name: _info_size(fields, name, where) for name in ("depth", "color")}
     else:
-        raise BadInput(
-            f"{root}: there is no {INTRINSIC_FILES[0]} and no {INFO}", hint="export the intrinsics with the SensReader"
-        )
+        raise BadInput(f"{root}: there is no {INTRINSIC_FILES[0]} and no {INFO}", hint=AGAIN)
     cameras = {}
     for name, size in (("depth", depth_size), ("color", color_size)):
         matrix = matrices[name]
@@ -189,9 +188,9 @@ def _info_numbers(fields: dict[str, str], name: str, path: Path, count: int) -> 
     try:
         numbers = np.array([float(field) for field in fields[name].split()])
     except (KeyError, ValueError):
-        raise BadInput(f"{path}: {name} is missing or no number") from None
+        raise BadInput(f"{path}: {name} is missing or no number", hint=AGAIN) from None
     if len(numbers) != count:
-        raise BadInput(f"{path}: {name} has {len(numbers)} numbers, expected {count}")
+        raise BadInput(f"{path}: {name} has {len(numbers)} numbers, expected {count}", hint=AGAIN)
     return numbers
 
 
@@ -202,7 +201,7 @@ def _info_matrix(fields: dict[str, str], name: str, path: Path) -> np.ndarray:
 def _info_number(fields: dict[str, str], name: str, path: Path) -> float:
     number = float(_info_numbers(fields, name, path, 1)[0])
     if not 0 < number < 1e9:
-        raise BadInput(f"{path}: {name} = {number:g} is no depth unit")
+        raise BadInput(f"{path}: {name} = {number:g} is no depth unit", hint=AGAIN)
     return number
 
 
@@ -212,5 +211,5 @@ def _info_size(fields: dict[str, str], name: str, path: Path) -> tuple[int, int]
         return None
     width, height = (float(_info_numbers(fields, field, path, 1)[0]) for field in names)
     if not (1 <= width <= 1e5 and 1 <= height <= 1e5):
-        raise BadInput(f"{path}: images of {width:g}x{height:g} pixels")
+        raise BadInput(f"{path}: images of {width:g}x{height:g} pixels", hint=AGAIN)
     return round(width), round(height)

@@ -48,7 +48,9 @@ def open_source(path: Path, parameters: IngestParameters, rule: str) -> LogSourc
     documents = read_json(root / POSES)
     numbered = {int(name[6:]): fields for name, fields in _frames(documents) if name[6:].isdecimal()}
     if not numbered:
-        raise BadInput(f"{root / POSES}: has no frames called frame_000000 and so on")
+        raise BadInput(
+            f"{root / POSES}: has no frames called frame_000000 and so on", hint=f"download {POSES} of the scene again"
+        )
     depths = images_by_number(root / "depth", (".png",)) if (root / "depth").is_dir() else {}
     colors = images_by_number(root / "rgb", (".jpg", ".png")) if (root / "rgb").is_dir() else {}
     video = VideoFrames(root / VIDEO, as_stored=True) if not colors and (root / VIDEO).is_file() else None
@@ -119,4 +121,4 @@ def _usual(numbered: dict[int, dict[str, object]]) -> tuple[float, ...]:
         matrix = numbers_of(fields.get("intrinsic"), 9)
         if matrix is not None:
             return matrix[0], matrix[4], matrix[2], matrix[5]
-    raise BadInput(f"{POSES}: no frame states an intrinsic matrix")
+    raise BadInput(f"{POSES}: no frame states an intrinsic matrix", hint=f"download {POSES} of the scene again")

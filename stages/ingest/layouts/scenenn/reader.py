@@ -64,7 +64,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     entries_of_log = read_numbered_open3d_log(root / TRAJECTORY)
     poses = {number + first: pose for number, pose in entries_of_log}
     if len(poses) < len(entries_of_log):
-        raise BadInput(f"{root / TRAJECTORY}: two entries have the same frame number")
+        raise BadInput(f"{root / TRAJECTORY}: two entries have the same frame number", hint="delete one of them")
     stray = len(poses.keys() - set(numbers))
     times = _times(root)
     camera, notes = _camera(root, depth_image_size(depths.values()), parameters)
@@ -115,7 +115,10 @@ def _times(root: Path) -> dict[int, int]:
             continue
         # Older copies have the number and one time, the data set's playback tool writes that of colour, then of depth.
         if len(fields) not in (2, 3) or not all(field.isdecimal() and len(field) < 18 for field in fields):
-            raise BadInput(f"{path}: line {line}: expected a frame number and one or two times in whole microseconds")
+            raise BadInput(
+                f"{path}: line {line}: expected a frame number and one or two times in whole microseconds",
+                hint="correct that line",
+            )
         times[int(fields[0])] = min(int(fields[1]), LATEST_MICROSECONDS)
     return times
 
@@ -143,9 +146,9 @@ def _read_ini(path: Path) -> Camera:
         try:
             values[fields[0].lower()] = float(fields[1])
         except (IndexError, ValueError):
-            raise BadInput(f"{path}: line {line}: expected a name and a number") from None
+            raise BadInput(f"{path}: line {line}: expected a name and a number", hint="correct that line") from None
     width, height = values.get("depth_width", 640.0), values.get("depth_height", 480.0)
     if not (1 <= width <= 1e5 and 1 <= height <= 1e5):
-        raise BadInput(f"{path}: images of {width:g}x{height:g} pixels")
+        raise BadInput(f"{path}: images of {width:g}x{height:g} pixels", hint="write width and height in pixels")
     numbers = (values.get("fx"), values.get("fy"), values.get("cx", width / 2), values.get("cy", height / 2))
     return pinhole(numbers, (round(width), round(height)), str(path))

@@ -102,9 +102,21 @@ def _camera(root: Path, size: tuple[int, int] | None, parameters: IngestParamete
     if path.exists():
         matrix = read_matrix(path, 3, 3)
         if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
-            raise BadInput(f"{path}: focal lengths {matrix[0, 0]:g}, {matrix[1, 1]:g} are not positive")
+            raise BadInput(
+                f"{path}: focal lengths {matrix[0, 0]:g}, {matrix[1, 1]:g} are not positive",
+                hint="write it row by row: fx 0 cx, 0 fy cy, 0 0 1",
+            )
         (fx, _, cx), (_, fy, cy), _ = matrix
-        camera = Camera.of_outside(path, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+        camera = Camera.of_outside(
+            path,
+            width=width,
+            height=height,
+            fx=fx,
+            fy=fy,
+            cx=cx,
+            cy=cy,
+            hint="write it row by row: fx 0 cx, 0 fy cy, 0 0 1",
+        )
         return camera, (f"intrinsics read from {path.name}",)
     if size is not None and size != (640, 480):
         why = f"{root}: images are {width}x{height} and there is no {path.name}"

@@ -45,7 +45,7 @@ def read_odometry(path: Path) -> tuple[list[Odometry], tuple[str, ...]]:
             f"{path}: its first line names no column {', '.join(absent)}", hint=f"columns are {', '.join(POSE)}"
         )
     if len(set(names) - {""}) < len([name for name in names if name]):
-        raise BadInput(f"{path}: its first line names a column twice")
+        raise BadInput(f"{path}: its first line names a column twice", hint="rename one of them")
     rows: list[Odometry] = []
     damaged: list[int] = []
     for number, line in enumerate(lines[1:], start=2):
@@ -72,7 +72,7 @@ def read_camera_matrix(path: Path) -> tuple[float, float, float, float]:
     try:
         numbers = [float(field) for field in read_text(path).replace(",", " ").split()]
     except ValueError:
-        raise BadInput(f"{path}: holds a value that is not a number") from None
+        raise BadInput(f"{path}: holds a value that is not a number", hint="copy it off the phone again") from None
     if len(numbers) != 9 or numbers[6:] != [0, 0, 1]:
         raise BadInput(f"{path}: is not a 3x3 camera matrix", hint="three lines of three numbers, the last 0, 0, 1")
     return numbers[0], numbers[4], numbers[2], numbers[5]
@@ -80,7 +80,7 @@ def read_camera_matrix(path: Path) -> tuple[float, float, float, float]:
 
 def has_intrinsics(path: Path) -> bool:
     """Whether the first line names poses and intrinsics."""
-    with opened(path) as file:
+    with opened(path, hint="check its permissions") as file:
         names = {field.strip() for field in file.readline(HEADER).decode("utf-8", "replace").split(",")}
     return names.issuperset((*POSE, *INTRINSICS))
 

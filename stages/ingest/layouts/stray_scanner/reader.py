@@ -66,7 +66,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
         if full_size is None:
             source = MATRIX if (root / MATRIX).is_file() else ODOMETRY
             raise BadInput(
-                f"{root / source}: centre {matrix[2]:g}, {matrix[3]:g} is not that of pictures of "
+                f"{root / source}: centre {matrix[2]:g}, {matrix[3]:g} is not that of images of "
                 f"{size_words(picture_size or RECORDED)} pixels",
                 hint="give --fx --fy --cx --cy of the depth, or put the app's own camera_matrix.csv there",
             )

@@ -166,7 +166,7 @@ def _images(root: Path, unit: float) -> tuple[_Stamped, _Stamped]:
     columns: tuple[list[tuple[str, str, str]], ...] = ([], [])
     for where, fields in _rows(path):
         if len(fields) != 4:
-            raise BadInput(f"{where}: {len(fields)} columns, expected stamp, name, stamp, name")
+            raise BadInput(f"{where}: {len(fields)} columns, expected stamp, name, stamp, name", hint="correct it")
         pairs = [(fields[0], fields[1]), (fields[2], fields[3])]
         if "depth" in fields[1].split("/")[0] and "depth" not in fields[3].split("/")[0]:
             pairs.reverse()  # ICL-NUIM lists depth first
@@ -179,7 +179,7 @@ def _read_list(root: Path, name: str, unit: float) -> _Stamped:
     rows = []
     for where, fields in _rows(root / name, maximum_splits=1):
         if len(fields) != 2:
-            raise BadInput(f"{where}: expected a time stamp and a file name")
+            raise BadInput(f"{where}: expected a time stamp and a file name", hint="correct it")
         rows.append((where, fields[0], fields[1].strip()))
     return _stamped(root, rows, unit)
 
@@ -222,8 +222,8 @@ def _paired(
     counts = len(colors.paths), len(depths.paths)
     if all(counts) and counts[0] != counts[1]:
         raise BadInput(
-            f"{root}: {problem}, and {counts[0]} pictures and {counts[1]} depth images have no common order",
-            hint=f"put {ASSOCIATIONS[1]} in the place of {COLOR_LIST}: a line `number picture number depth` a frame",
+            f"{root}: {problem}, and {counts[0]} images and {counts[1]} depth images have no common order",
+            hint=f"put {ASSOCIATIONS[1]} in the place of {COLOR_LIST}: a line `number image number depth` a frame",
         )
     stamps = in_file_order(max(counts), parameters.frame_rate)
     colors, depths = (replace(each, stamps=stamps[: len(each.paths)]) for each in (colors, depths))
@@ -310,7 +310,7 @@ def _read_calibration(path: Path, size: tuple[int, int] | None) -> RecordedCamer
     try:
         numbers = [float(field) for field in fields]
     except ValueError:
-        raise BadInput(f"{path}: expected the numbers fx fy cx cy [k1 k2 p1 p2 [k3]]") from None
+        raise BadInput(f"{path}: expected the numbers fx fy cx cy [k1 k2 p1 p2 [k3]]", hint="correct it") from None
     if len(numbers) not in (4, 8, 9):
-        raise BadInput(f"{path}: {len(numbers)} numbers, expected fx fy cx cy [k1 k2 p1 p2 [k3]]")
+        raise BadInput(f"{path}: {len(numbers)} numbers, expected fx fy cx cy [k1 k2 p1 p2 [k3]]", hint="correct it")
     return RecordedCamera(pinhole(numbers[:4], size, str(path)), lens_of(numbers[4:], str(path)))

@@ -40,6 +40,6 @@ def view(page: Page) -> dict[str, Any] | None:
         "rows": [turn_row(number, turn) for number, turn in enumerate(file.turns[:MOST_ROWS], 1)],
         "hidden": max(0, len(file.turns) - MOST_ROWS),
         "moving": animation(moving, "the map growing, turn by turn") if moving.is_file() else None,
-        "views": from_file(views, "the last pictures of the wrist camera", WIDTH) if views.is_file() else None,
+        "views": from_file(views, "the last images of the wrist camera", WIDTH) if views.is_file() else None,
         "picture": from_file(picture, "the map as it grew", WIDTH) if picture.is_file() else None,
     }

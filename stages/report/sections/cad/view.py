@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from scenewright.schemas.cad_library import CadLibrary
-from scenewright.schemas.cad_scene import CadScene, Replacement
+from scenewright.schemas.cad_scene import UNEXPLAINED, CadScene, CadSceneFile, Replacement
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.sequence import Sequence
@@ -30,6 +30,7 @@ def view(page: Page) -> dict[str, Any] | None:
     pictures = [draw(model, seen_from, "CAD scene", room.font_size(20.0))]
     if room.in_image_colours is not None:
         pictures.append(replace(room.in_image_colours, caption="The map from the same place."))
+    pictures += _unexplained(cad_scene, seen_from)
     pictures += _true_room(page, seen_from)
     from_above = top_view(room.scanned or model, round(0.75 * room.width))
     pictures.append(draw(model, from_above, "CAD scene from above", room.font_size(15.5)))
@@ -38,11 +39,33 @@ def view(page: Page) -> dict[str, Any] | None:
     return {
         "cad_views": pictures,
         "replacements": [_replacement_row(r) for r in scene.replacements if r.decision != "layout"],
-        "cad_text": f"CAD models: {decisions.count('cad')}; objects that keep their mesh: {decisions.count('mesh')}; "
+        "cad_text": f"CAD models: {decisions.count('cad')}; things that keep their mesh: {decisions.count('mesh')}; "
         f"layout: {decisions.count('layout')}. The global check went from {scene.conflicts_before} to "
-        f"{scene.conflicts_after} colliding pairs in {scene.iterations} iterations.",
+        f"{scene.conflicts_after} colliding pairs in {scene.iterations} iterations.{_explained_text(scene)}",
         **_candidates(page, cad_scene, seen_from),
     }
+
+
+def _explained_text(scene: CadSceneFile) -> str:
+    """Return a sentence about how much of the things' surface is explained, in a scene that says it."""
+    entries = [r.explained for r in scene.replacements if r.explained is not None]
+    total = sum(entry.area for entry in entries)
+    if scene.explained_within is None or not total:
+        return ""
+    by_model = sum(entry.area * entry.by_model for entry in entries) / total
+    by_mesh = sum(entry.area * entry.by_mesh for entry in entries) / total
+    return (
+        f" Within {1000 * scene.explained_within:.0f} mm, models explain {100 * by_model:.0f} % of what was seen "
+        f"of things, and meshes of their own {100 * by_mesh:.0f} %."
+    )
+
+
+def _unexplained(cad_scene: CadScene, seen_from: View) -> list[DrawnView]:
+    """Return the scene with what nothing in it explains; nothing where there is no such."""
+    if not cad_scene.path(UNEXPLAINED).is_file():
+        return []
+    model = cad_model(cad_scene, with_unexplained=True)
+    return [] if model is None else [draw(model, seen_from, "Unexplained surface of the map, in red")]
 
 
 def _true_room(page: Page, seen_from: View) -> list[DrawnView]:
@@ -94,6 +117,15 @@ def _replacement_row(replacement: Replacement) -> dict[str, str]:
         "what": decision,
         "scale": f"{chosen.scale:.3f}" if chosen else "",
         "matching": f"{chosen.matching_error:.3f}" if chosen else "",
+        "explained": _explained(replacement),
         "alignment": f"{1000 * chosen.alignment_error:.0f} mm" if chosen else "",
         "rest": "; ".join(text for text in (others, f"rejected: {rejected}" if rejected else "") if text),
     }
+
+
+def _explained(replacement: Replacement) -> str:
+    explained = replacement.explained
+    if explained is None:
+        return ""
+    by = ((explained.by_model, ""), (explained.by_mesh, " (mesh)"))
+    return ", ".join(f"{100 * share:.0f} %{how}" for share, how in by if share > 0) or "0 %"

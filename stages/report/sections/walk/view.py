@@ -8,6 +8,7 @@ from scenewright.schemas.cad_scene import CadScene
 from scenewright.schemas.contact_graph import ContactGraph
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.stages.kit.explaining.sources import sentences
 from scenewright.stages.kit.viewing.canvas import SHELL
 from scenewright.stages.kit.viewing.graphs import DRAWN, draw_graph
 from scenewright.stages.kit.viewing.maps import LAYERS, draw_panoptic_map
@@ -43,6 +44,7 @@ def view(page: Page) -> dict[str, Any] | None:
         name = "scene" if scene is not None else "graph"
         layers = LAYERS if scene is not None else tuple(layer for layer in LAYERS if layer != "color")
         draw_graph(file, canvas, *layers, trusted=trusted, name=name, boxes=not has_mesh)
+    canvas.explain(sentences(page.sources))
     text = canvas.page()
     if len(text) > LARGEST:
         return {"walk_page": "", "walk_size": f"{len(text) / 1e6:.0f} MB", "scripts": ()}

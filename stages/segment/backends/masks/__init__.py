@@ -21,7 +21,7 @@ class MasksParameters(Parameters):
     )
     masks_named_like: Literal["auto", "log", "sequence"] = Field(
         "auto",
-        description="Masks are named like the log's pictures (log), or by numbers of the sequence's frames (sequence); "
+        description="Masks are named like the log's images (log), or by numbers of the sequence's frames (sequence); "
         "auto takes the log's names where masks have them",
     )
 

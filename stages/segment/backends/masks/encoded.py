@@ -91,4 +91,7 @@ def check_amount(count: int, shape: tuple[int, int], where: str) -> None:
     """Raise BadInput, beginning with `where`, when so many masks of `shape` are more than are held at a time."""
     if count * shape[0] * shape[1] > MOST_PIXELS:
         most = MOST_PIXELS // max(shape[0] * shape[1], 1)
-        raise BadInput(f"{where}: {count} masks in one frame, at most {most} of this size are read")
+        raise BadInput(
+            f"{where}: {count} masks in one frame, at most {most} of this size are read",
+            hint="leave out what overlaps or is doubtful",
+        )

@@ -43,9 +43,9 @@ def read_instances(path: Path, shape: tuple[int, int]) -> tuple[np.ndarray, bool
         image = image[..., 0]  # grey, stored as colour
     if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
         raise BadInput(
-            f"{path}: is a colour image without a table of its classes",
-            hint="put a labelmap.txt beside it (a line `chair:128,0,0` for each class), COCO's JSON where it is a "
-            "panoptic PNG, or write one channel whose values are the instances",
+            f"{path}: a colour image without a table of classes",
+            hint="put a labelmap.txt beside it (a line `chair:128,0,0` a class) or COCO's panoptic JSON, or write "
+            "one channel of instances",
         )
     # Samples of less than 8 bits are stretched to 0..255 when they are decoded.
     bits = data[BITS_AT]
@@ -93,10 +93,12 @@ def _checked_content(path: Path, shape: tuple[int, int]) -> bytes:
     if size != (shape[1], shape[0]):
         raise BadInput(
             f"{path}: masks of {size[0]}x{size[1]}, the frame has {shape[1]}x{shape[0]} pixels",
-            hint="scale the network's masks to the pictures of the sequence (nearest neighbour)",
+            hint="scale the network's masks to the images of the sequence (nearest neighbour)",
         )
     if not may_be_decoded(data):
-        raise BadInput(f"{path}: declares {size[0]}x{size[1]} pixels, which {len(data)} bytes cannot hold")
+        raise BadInput(
+            f"{path}: declares {size[0]}x{size[1]} pixels, which {len(data)} bytes cannot hold", hint="write it again"
+        )
     return data
 
 

@@ -71,7 +71,7 @@ def match_pictures(
     counted = [_frame_of(picture, number, times, tolerance) for picture, number in zip(pictures, numbers, strict=True)]
     by_log = [_of_log(picture, names) for picture in pictures]
     if named_like == "log" and not any(by_log):
-        raise BadInput(f"{where}: no mask is named like a picture of the log", hint="leave out --masks-named-like")
+        raise BadInput(f"{where}: no mask is named like an image of the log", hint="leave out --masks-named-like")
     if named_like == "sequence" or not any(by_log):
         return _placed(pictures, counted, times, where, _counting_from_one(counted))
     strangers = [k for k, found in enumerate(by_log) if found is None and counted[k].way != STAMP]
@@ -80,23 +80,23 @@ def match_pictures(
     if named_like == "auto" and _both_fit(named, counted):
         if strangers and not names.gapless:
             raise BadInput(
-                f"{where}: {len(pictures) - len(strangers)} of {len(pictures)} masks are named like pictures of the "
-                f"log, {pictures[strangers[0]].name!r} is not, and the numbers of all are those of other frames",
+                f"{where}: {len(pictures) - len(strangers)} of {len(pictures)} masks are named like images of the "
+                f"log, {pictures[strangers[0]].name!r} is not; their numbers are those of other frames",
                 hint="say which: --masks-named-like log, or --masks-named-like sequence",
             )
         if strangers:  # the log has every picture from its first to its last, and this is none of them
             warnings.append(
-                f"mask {pictures[strangers[0]].name!r} is of no picture of the log: the numbers of all masks count the "
+                f"mask {pictures[strangers[0]].name!r} is of no image of the log: the numbers of all masks count the "
                 "frames of the sequence from 0 (--masks-named-like log goes by the log's names)"
             )
             return _placed(pictures, counted, times, where, warnings)
         warnings.append(
-            "masks go by the names of the log's pictures; their numbers are those of other frames of the sequence "
+            "masks go by the names of the log's images; their numbers are those of other frames of the sequence "
             "(--masks-named-like sequence goes by numbers)"
         )
     if strangers:
         shown = ", ".join(pictures[k].name or "image" for k in strangers[:SHOWN])
-        warnings.append(f"{len(strangers)} masks are of no picture of the log and left out: {shown}")
+        warnings.append(f"{len(strangers)} masks are of no image of the log and left out: {shown}")
     kept = [k for k, found in enumerate(named) if k not in strangers and found.frame != LEFT_OUT]
     matching = _placed([pictures[k] for k in kept], [named[k] for k in kept], times, where, warnings)
     return replace(matching, places={frame: kept[place] for frame, place in matching.places.items()})
@@ -128,8 +128,8 @@ def _placed(
         astray_text = ", ".join(astray[:SHOWN]) + (", ..." if len(astray) > SHOWN else "")
         raise BadInput(
             f"{where}: {len(astray)} of {len(pictures)} masks are of frames outside the sequence: {astray_text}",
-            hint=f"the sequence has frames 0 to {len(times) - 1} from {times.min():.6f} to {times.max():.6f} s; "
-            "name masks by these numbers or times, or as the log names its pictures"
+            hint=f"name masks by frames, 0 to {len(times) - 1}, by times, {times.min():.6f} to {times.max():.6f} s, or "
+            "like the log's images"
             if len(times)
             else "the sequence is empty",
         )
@@ -147,7 +147,7 @@ def _counting_from_one(counted: Sequence[_Found]) -> list[str]:
     if min(frames, default=0) != 1:
         return []
     return [
-        "numbers in the masks' names begin at 1, and frames of the sequence at 0: if they count pictures from 1, each "
+        "numbers in the masks' names begin at 1, and frames of the sequence at 0: if they count images from 1, each "
         "mask is one frame late; name them by time stamp then"
     ]
 
@@ -163,8 +163,8 @@ def _two_of_one_frame(pictures: Sequence[Picture], first: int, second: int, fram
         picture.seen or picture.name or f"image {picture.number}" for picture in (pictures[first], pictures[second])
     ]
     hint = (
-        "name a picture 000012 (its frame), 1305031102.175304 (its time) or with one number that differs; several "
-        "masks of one picture lie in a folder of its name (000012/0.png, 000012/1.png)"
+        "name an image 000012 (its frame), 1305031102.175304 (its time) or with one number that differs; several "
+        "masks of one image lie in a folder of its name (000012/0.png, 000012/1.png)"
     )
     if pictures[first].name and pictures[first].name == pictures[second].name:
         hint = (

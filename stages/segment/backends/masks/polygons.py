@@ -59,10 +59,10 @@ def turned(points: np.ndarray, about: tuple[float, float], turn: float) -> np.nd
 def check_size(size: tuple[int, int] | None, polygons: Sequence[np.ndarray], shape: tuple[int, int]) -> None:
     """Raise BadInput when polygons are of pictures of another `size` (width, height) than a frame of `shape` (H, W);
     None: nobody says it, and they must not reach over the frame."""
-    hint = "outlines have the size of the sequence's pictures; scale them"
+    hint = "outlines have the size of the sequence's images; scale them"
     if size is not None and size != (shape[1], shape[0]):
         raise BadInput(
-            f"its outline is of a picture of {size[0]}x{size[1]}, the frame has {shape[1]}x{shape[0]} pixels", hint=hint
+            f"its outline is of an image of {size[0]}x{size[1]}, the frame has {shape[1]}x{shape[0]} pixels", hint=hint
         )
     if size is None and polygons:
         reach = np.concatenate(polygons).max(axis=0)

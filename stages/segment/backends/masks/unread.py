@@ -6,7 +6,7 @@ from collections import Counter
 
 from scenewright.stages.segment.backends.masks.listing import Listing
 
-AS_NPZ = "np.savez(name, masks=...) for each picture, masks (N, H, W) of bool (docs/MASKS.md)"
+AS_NPZ = "np.savez(name, masks=...) for each image, masks (N, H, W) of bool (docs/MASKS.md)"
 WAYS = {
     ".xml": "from CVAT export COCO 1.0 or Segmentation mask 1.1; a VOC file of boxes holds no masks",
     ".npy": f"load the arrays and write them with {AS_NPZ}",

@@ -22,7 +22,7 @@ class WordsTraining(TrainingParameters):
 
 TRAINING = TrainingDeclaration(
     name="words",
-    summary="the embedded encoder of pictures and words, on samples of generated rooms and models",
+    summary="the embedded encoder of images and words, on samples of generated rooms and models",
     package=__name__,
     parameters=WordsTraining,
 )

@@ -136,7 +136,7 @@ class Run(TrainingRun):
         """Write the state, and the checkpoint as it would be used now."""
         super().save()
         description = (
-            f"trained on {self.plan.pictures} rendered pictures, step {self.step} of {self.plan.steps}, "
+            f"trained on {self.plan.pictures} rendered images, step {self.step} of {self.plan.steps}, "
             f"batch {self.plan.batch}, seed {self.plan.seed}" + (", a refinement" if self.plan.start else "")
         )
         save_network(self.out / FILE, self.averaged(), description)

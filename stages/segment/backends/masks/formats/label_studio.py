@@ -38,7 +38,7 @@ def open_source(listing: Listing) -> MaskSource | None:
         results = _results(task)
         sizes = {size for row in results if (size := _size(row)) is not None}
         if len(sizes) > 1:
-            raise BadInput(f"{where}: its results are of pictures of several sizes", hint=HINT)
+            raise BadInput(f"{where}: its results are of images of several sizes", hint=HINT)
         name = _picture_name(task)
         pictures.append(Picture(stem_of(name), size=next(iter(sizes), None), seen=name))
         shapes.append([_shape(row, f"{where}: result {k}") for k, row in enumerate(results, start=1) if _is_area(row)])
@@ -118,7 +118,7 @@ def brush_mask(code: Any, size: tuple[int, int], where: str) -> np.ndarray:
     runs: a bit (1: one value for all), 2 bits (which of the four lengths), the count less one, and the value or values
     (all lengths less one). Source: label_studio_sdk, converter/brush.py. Raises BadInput, beginning with `where`.
     """
-    damaged = BadInput(f"{where}: its brush is damaged, or of another size than the picture", hint=HINT)
+    damaged = BadInput(f"{where}: its brush is damaged, or of another size than the image", hint=HINT)
     if not isinstance(code, list) or not all(type(byte) is int and 0 <= byte < 256 for byte in code):
         raise damaged
     bits = "".join(f"{byte:08b}" for byte in code)

@@ -91,4 +91,4 @@ def _area(row: Any, points: np.ndarray, where: str) -> list[np.ndarray] | Crop |
     raise BadInput(f"{where}: a shape of the unknown kind {kind!r:.30}", hint="draw it as a polygon")
 
 
-FORMAT = MaskFormat("LabelMe", "a JSON a picture with `shapes`", 32, open_source)
+FORMAT = MaskFormat("LabelMe", "a JSON an image with `shapes`", 32, open_source)

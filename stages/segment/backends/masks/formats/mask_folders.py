@@ -83,8 +83,8 @@ def _are_pictures(folders: list[str], stems: list[str], root: Path) -> bool | No
     if all(map(OF_A_MASK.search, folders)) != all(map(OF_A_MASK.search, stems)):
         return all(map(OF_A_MASK.search, stems))
     raise BadInput(
-        f"{root}: nothing says whether {folders[0]!r} or {stems[0]!r} is a picture",
-        hint="name what is a picture by its frame: 000012/3.png is mask 3 of frame 12, chair/000012.png a chair there",
+        f"{root}: nothing says whether {folders[0]!r} or {stems[0]!r} is an image",
+        hint="name what is an image by its frame: 000012/3.png is mask 3 of frame 12, chair/000012.png a chair there",
     )
 
 
@@ -114,4 +114,4 @@ def _mask(path: Path, shape: tuple[int, int]) -> np.ndarray:
     return values != 0
 
 
-FORMAT = MaskFormat("mask PNGs", "a PNG a mask, in a folder a picture (amg.py) or a folder a class", 47, open_source)
+FORMAT = MaskFormat("mask PNGs", "a PNG a mask, in a folder an image (amg.py) or a folder a class", 47, open_source)

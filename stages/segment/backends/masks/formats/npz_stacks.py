@@ -31,7 +31,7 @@ from scenewright.stages.segment.backends.masks.overlapping import flatten
 from scenewright.stages.segment.backends.masks.values import named_by_value, numbered
 
 HINT = (
-    "np.savez(name, masks=..., classes=..., scores=...), masks (N, H, W) of bool; a picture without masks has "
+    "np.savez(name, masks=..., classes=..., scores=...), masks (N, H, W) of bool; an image without masks has "
     "masks=np.zeros((0, H, W), bool)"
 )
 NAMES = ("masks", "ids", "id", "classes", "scores")
@@ -75,7 +75,7 @@ def _arrays(path: Path) -> set[str]:
     with opened(path, hint=HINT) as file, zip_errors(path, HINT), zipfile.ZipFile(file) as archive:
         rows = [row for row in archive.infolist() if row.filename.removesuffix(".npy") in NAMES]
         if sum(row.file_size for row in rows) > LARGEST_FILE:
-            raise BadInput(f"unpacks to more than {LARGEST_FILE} bytes", hint="write one file a picture")
+            raise BadInput(f"unpacks to more than {LARGEST_FILE} bytes", hint="write one file an image")
         have = {row.filename.removesuffix(".npy") for row in rows}
     if ("masks" in have) == ("ids" in have):
         raise BadInput(f"{path}: needs either `masks` (N, H, W) or `ids` (H, W)", hint=HINT)
@@ -148,7 +148,7 @@ def _check_size(path: Path, image: np.ndarray, shape: tuple[int, int]) -> None:
     if image.shape[-2:] != shape:
         raise BadInput(
             f"{path}: masks of {image.shape[-1]}x{image.shape[-2]}, the frame has {shape[1]}x{shape[0]} pixels",
-            hint="scale the network's masks to the pictures of the sequence (nearest neighbour)",
+            hint="scale the network's masks to the images of the sequence (nearest neighbour)",
         )
 
 
@@ -182,4 +182,4 @@ def _given_masks(path: Path, arrays: dict[str, np.ndarray], count: int, numbers:
     return masks
 
 
-FORMAT = MaskFormat("NPZ stacks", "`masks` (N, H, W) or `ids` (H, W), a file a picture", 40, open_source)
+FORMAT = MaskFormat("NPZ stacks", "`masks` (N, H, W) or `ids` (H, W), a file an image", 40, open_source)

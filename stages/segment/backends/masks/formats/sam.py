@@ -21,7 +21,7 @@ from scenewright.stages.segment.backends.masks.given import (
 )
 from scenewright.stages.segment.backends.masks.listing import Listing, read_json
 
-HINT = 'write SamAutomaticMaskGenerator(output_mode="coco_rle").generate(image) as JSON, a file a picture'
+HINT = 'write SamAutomaticMaskGenerator(output_mode="coco_rle").generate(image) as JSON, a file an image'
 
 
 def open_source(listing: Listing) -> MaskSource | None:
@@ -59,4 +59,4 @@ def _score(row: dict[str, Any], where: str) -> float:
     return float(min([1.0, *scores]))
 
 
-FORMAT = MaskFormat("SAM", "Segment Anything's automatic masks, a JSON a picture", 30, open_source)
+FORMAT = MaskFormat("SAM", "Segment Anything's automatic masks, a JSON an image", 30, open_source)

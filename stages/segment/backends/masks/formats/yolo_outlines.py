@@ -113,6 +113,4 @@ def _names(path: Path) -> Any:
     return names if isinstance(names, list | dict) else None
 
 
-FORMAT = MaskFormat(
-    "YOLO outlines", "a text a picture, `class x1 y1 x2 y2 ...` in shares of the picture", 40, open_source
-)
+FORMAT = MaskFormat("YOLO outlines", "a text an image, `class x1 y1 x2 y2 ...` in shares of the image", 40, open_source)

@@ -3,44 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any
 
-from scenewright.cli.explaining.cad_reasons import cad_reasons
-from scenewright.cli.explaining.graph_reasons import graph_reasons
-from scenewright.cli.explaining.map_reasons import map_reasons
-from scenewright.cli.explaining.plan_reasons import plan_reasons
-from scenewright.cli.explaining.reason import Reason, Reasons
-from scenewright.cli.explaining.scene_reasons import scene_reasons
 from scenewright.cli.viewing.desk.generations import behind
 from scenewright.schemas.artifact import Artifact
-from scenewright.schemas.cad_scene import CadScene
-from scenewright.schemas.contact_graph import ContactGraph, GraphNode
 from scenewright.schemas.errors import BadInput, UsageError
-from scenewright.schemas.interactive_scene import InteractiveScene
-from scenewright.schemas.panoptic_map import PanopticMap
-from scenewright.schemas.plan import Plan
+from scenewright.stages.kit.explaining.reason import Reason
+from scenewright.stages.kit.explaining.sources import EXPLAINED, Source, name_as_later
+from scenewright.stages.kit.explaining.sources import sentences as sentences_of
 
-EXPLAINED: tuple[tuple[type[Artifact], Callable[[Any], Reasons]], ...] = (
-    (PanopticMap, map_reasons),
-    (ContactGraph, graph_reasons),
-    (CadScene, cad_reasons),
-    (InteractiveScene, scene_reasons),
-    (Plan, plan_reasons),
-)
-"""In the order in which they are made."""
 NEAREST = 5
 """Names that are offered in place of one that is not known."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """What one artifact records."""
-
-    artifact: Artifact
-    reasons: Reasons
 
 
 @dataclass(frozen=True)
@@ -94,7 +69,7 @@ def explain(artifact: Artifact) -> Explained:
             if nearest is artifact:
                 raise
             missing.append(str(error))
-    _name_as_later(sources)
+    name_as_later(sources)
     return Explained(artifact, tuple(sources), (*missing, *_gone(sources)))
 
 
@@ -104,26 +79,7 @@ def sentences(artifact: Artifact) -> dict[str, list[str]]:
         explained = explain(artifact)
     except BadInput:
         return {}
-    return {
-        name: [reason.says for source in explained.sources for reason in source.reasons.get(name, ())]
-        for name in explained.names()
-    }
-
-
-def _name_as_later(sources: list[Source]) -> None:
-    """Give the reasons of a map's entities the names, too, that graphs and scenes have for them after an edit."""
-    maps = [source for source in sources if isinstance(source.artifact, PanopticMap)]
-    for source in maps:
-        assert isinstance(source.artifact, PanopticMap)
-        first = {entity.instance: f"{entity.class_name}_{entity.instance}" for entity in source.artifact.info.entities}
-        for node in (node for later in sources for node in _nodes(later.artifact) if node.instance in first):
-            source.reasons.setdefault(node.id, source.reasons[first[node.instance]])
-
-
-def _nodes(artifact: Artifact) -> tuple[GraphNode, ...]:
-    if isinstance(artifact, ContactGraph):
-        return artifact.info.nodes
-    return artifact.graph.nodes if isinstance(artifact, CadScene | InteractiveScene) else ()
+    return sentences_of(explained.sources)
 
 
 def _gone(sources: list[Source]) -> Iterator[str]:

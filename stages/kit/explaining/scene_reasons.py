@@ -6,12 +6,12 @@ import math
 from collections.abc import Collection, Iterator
 
 import numpy as np
-from scenewright.cli.explaining.reason import Reason, Reasons, length, listed
 from scenewright.schemas.cad_scene import SURROUNDINGS
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.interactive_scene import InteractiveScene, InteractiveSceneFile, SceneBody, SettledBody
 from scenewright.schemas.scene_parts import Joint
 from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.explaining.reason import Reason, Reasons, length, listed
 from scenewright.stages.kit.formats.mobility import STANDS, Mobility, mobility
 
 HELD, INFERRED = "held: ", "inferred: "

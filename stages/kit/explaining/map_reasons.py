@@ -4,17 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from scenewright.cli.explaining.reason import (
-    Reason,
-    Reasons,
-    counted,
-    edit_reasons,
-    length,
-    listed,
-    merged,
-    numbered,
-    percent,
-)
 from scenewright.schemas.panoptic_map import (
     Because,
     BecauseFile,
@@ -26,6 +15,17 @@ from scenewright.schemas.panoptic_map import (
     PanopticMap,
 )
 from scenewright.schemas.vocabulary import UNNAMED
+from scenewright.stages.kit.explaining.reason import (
+    Reason,
+    Reasons,
+    counted,
+    edit_reasons,
+    length,
+    listed,
+    merged,
+    numbered,
+    percent,
+)
 
 FAINT = 0.005
 """Least score or posterior that is said: it would be said as 0.00 else."""

@@ -5,12 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from scenewright.cli.explaining.reason import Reason, Reasons, counted, edit_reasons, length, listed, merged
-from scenewright.schemas.cad_scene import CadCandidate, CadScene, JointEvidence, Replacement
+from scenewright.schemas.cad_scene import CadCandidate, CadScene, Explained, JointEvidence, Replacement, Tried
+from scenewright.stages.kit.explaining.reason import (
+    Reason,
+    Reasons,
+    counted,
+    edit_reasons,
+    length,
+    listed,
+    merged,
+    percent,
+)
 from scenewright.stages.kit.measurement.cad_candidates import candidates_of
 
 MOST_OTHERS = 3
 """Most other models that are named."""
+WAYS = {
+    "library": "Models of the library of its class",
+    "stretched": "Models stretched along their own axes",
+    "by_shape": "Models of the class that its shape tells",
+    "family": "Parts of a family of furniture, fitted to it",
+    "built_in": "Boxes made for it",
+}
+"""Ways of seeking what stands for a thing."""
 GROUNDS = {
     "user": "a person vouches for it",
     "moved": "the log shows its part move",
@@ -50,6 +67,9 @@ def replacement_reasons(entry: Replacement) -> Iterator[Reason]:
         yield Reason(f"The model {chosen.model_id}{stretched} stands for it. {_fit(chosen)}", _facts(entry))
         if entry.reason:
             yield Reason(f"The reason: {entry.reason}.", {"reason": entry.reason})
+    yield from (_tried(tried) for tried in entry.tries)
+    if entry.explained is not None:
+        yield _explained(entry.explained)
     listed_candidates = candidates_of(entry)
     best = entry.best_single
     if chosen is not None and best is not None and best.library_model != chosen.library_model:
@@ -58,6 +78,10 @@ def replacement_reasons(entry: Replacement) -> Iterator[Reason]:
     elif listed_candidates and listed_candidates[0][0] == "chosen, best by itself":
         yield Reason("It is also what fitted best by itself.", {"best_single": listed_candidates[0][1].model_id})
     yield from _others(entry, [candidate for role, candidate in listed_candidates if role == ""])
+    if chosen is not None and entry.tries and not chosen.joints:
+        yield Reason("Nothing on it opens: the model has no joint.", {"joints": {}})
+    if entry.stays:
+        yield Reason(f"As far as this scene says, it is {entry.stays}.", {"stays": entry.stays})
     if entry.rejected:
         total = counted(sum(entry.rejected.values()), "candidate")
         order = sorted(entry.rejected.items(), key=lambda row: (-row[1], row[0]))
@@ -92,7 +116,7 @@ def _others(entry: Replacement, candidates: list[CadCandidate]) -> Iterator[Reas
             best[candidate.model_id] = candidate
     order = sorted(best.values(), key=lambda one: (one.alignment_error, one.model_id))
     if order:
-        rows = [f"{one.model_id} ({length(one.alignment_error)})" for one in order[:MOST_OTHERS]]
+        rows = [f"{one.model_id} ({_against(one, entry.chosen)})" for one in order[:MOST_OTHERS]]
         more = f" and {len(order) - MOST_OTHERS} more" if len(order) > MOST_OTHERS else ""
         errors = {one.model_id: one.alignment_error for one in order}
         yield Reason(
@@ -100,9 +124,35 @@ def _others(entry: Replacement, candidates: list[CadCandidate]) -> Iterator[Reas
         )
 
 
+def _against(candidate: CadCandidate, chosen: CadCandidate | None) -> str:
+    """Return how far a model is from what was seen, and why another is chosen: what it costs more, and explains."""
+    says = [length(candidate.alignment_error)]
+    if chosen is not None and candidate.score is not None and chosen.score is not None:
+        more = candidate.score - chosen.score
+        says.append(f"costs {length(abs(more))} {'more' if more >= 0 else 'less'}")
+    if candidate.explained is not None:
+        says.append(f"explains {percent(candidate.explained)}")
+    return ", ".join(says)
+
+
 def _fit(candidate: CadCandidate) -> str:
-    error = length(candidate.alignment_error)
-    return f"It lies {error} (RMS) from what was seen, its matching error is {candidate.matching_error:.2f}."
+    error, matching = length(candidate.alignment_error), candidate.matching_error
+    matched = (
+        f", its matching error is {matching:.2f}" if matching > 0 else ""
+    )  # what is made for a thing is not matched
+    return f"It lies {error} (RMS) from what was seen{matched}."
+
+
+def _tried(tried: Tried) -> Reason:
+    gives = f"{WAYS[tried.way]}: {tried.model_id}" if tried.model_id else f"{WAYS[tried.way]}: nothing new"
+    return Reason(f"{gives}{f' ({tried.because})' if tried.because else ''}.", tried.model_dump(mode="json"))
+
+
+def _explained(explained: Explained) -> Reason:
+    by_model, by_mesh = percent(explained.by_model), percent(explained.by_mesh)
+    says = f"Of the {explained.area:.2f} m² that were seen of it, "
+    says += f"its own mesh explains {by_mesh}." if explained.by_mesh else f"the model explains {by_model}."
+    return Reason(says, {"explained": explained.model_dump(mode="json")})
 
 
 def _facts(entry: Replacement) -> dict[str, object]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from scenewright.cli.explaining.reason import Reason, Reasons, listed, merged
 from scenewright.schemas.outside import LARGEST_SETTINGS, file_text
 from scenewright.schemas.plan import Plan, PlanFile, PlannedAction
+from scenewright.stages.kit.explaining.reason import Reason, Reasons, listed, merged
 from scenewright.stages.kit.tasks.pddl import parse_domain, parse_problem
 from scenewright.stages.kit.tasks.strips import Atom, Domain, GroundAction, Problem, Schema, atom_text, bound
 

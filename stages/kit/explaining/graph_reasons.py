@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from scenewright.cli.explaining.reason import Reason, Reasons, edit_reasons, length, listed, merged, percent
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import TREE_RELATIONS, Relation
+from scenewright.stages.kit.explaining.reason import Reason, Reasons, edit_reasons, length, listed, merged, percent
 
 STANDS = {
     "supports": "It stands on {}",

@@ -1,0 +1,131 @@
+"""What a family makes of a thing: convex pieces in the frame of the thing, each seen or inferred."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scenewright.stages.cad.carcasses import Patches
+from scenewright.stages.cad.completion import inside_points
+from scenewright.stages.cad.explained import distances
+from scenewright.stages.cad.free_space import FreeSpace
+from scenewright.stages.kit.geometry.solids import Solid, hull_or_box
+
+MOST_FILLED = 0.2
+"""Share of a piece that was seen that may lie in space seen to be empty, as posts are some voxels wide; of
+what is inferred, none."""
+SEEN_THROUGH, ASIDE, APRON = 0.1, 0.05, 0.1
+"""Below a top, this share of the room was seen empty, so far from its edges and from top and ground [m]: what nobody
+saw through may be a box."""
+INFERRED_WORDS = "; inferred: "
+"""Between what was seen of a form and what was not, in words."""
+SPACING, COARSE = 0.02, 0.05
+"""Distance of the points at which a piece, and the room below a top, is held against seen space [m]: a voxel of a map
+for what may be thin."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A convex piece of a form."""
+
+    name: str
+    """Top, board, leg, seat, back, further piece."""
+    corners: np.ndarray
+    """(N, 3) [m], frame of the thing."""
+    seen: bool = True
+    """Whether surface of it was seen; else symmetry or the family says that it is there."""
+    level: tuple[np.ndarray, np.ndarray] | None = None
+    """Low and high corner (3,) of the rectangle on which things can stand, where it has one."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a family makes of a thing."""
+
+    family: str
+    classes: tuple[str, ...]
+    """What a thing of this form and size may be, the likeliest first."""
+    pieces: tuple[Piece, ...]
+    turn: np.ndarray
+    """(3, 3): world from the frame of the thing."""
+
+    @cached_property
+    def solids(self) -> list[Solid]:
+        """Its pieces as polyhedra, frame of the thing."""
+        return [hull_or_box(piece.corners) for piece in self.pieces]
+
+    def distance(self, patches: Patches) -> np.ndarray:
+        """Return how far patches of surface, frame of the thing, are from it (N,) [m]."""
+        return distances(patches.points, [(solid.vertices, solid.faces) for solid in self.solids])
+
+    @property
+    def words(self) -> str:
+        """Its pieces in words."""
+        seen = [piece.name for piece in self.pieces if piece.seen]
+        inferred = [piece.name for piece in self.pieces if not piece.seen]
+        listed = ", ".join(_counted(seen))
+        return f"{listed}{INFERRED_WORDS}{', '.join(_counted(inferred))}" if inferred else listed
+
+    @property
+    def inferred(self) -> list[int]:
+        """The numbers of the pieces that nobody saw."""
+        return [number for number, piece in enumerate(self.pieces) if not piece.seen]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The surface of a thing, and where nothing may be."""
+
+    patches: Patches
+    """Frame of the thing."""
+    base: float
+    """Height of what it stands on [m]."""
+    turn: np.ndarray
+    """(3, 3): world from the frame of the thing."""
+    free_space: FreeSpace
+    own: np.ndarray
+    """(V, 3) vertices of the thing, world [m]."""
+    carrying: tuple[float, ...] = ()
+    """Heights at which things stand on it or in it [m]."""
+
+    def turned(self, turn: np.ndarray) -> Reading:
+        """Return it in another frame: `turn` (3, 3), world from that frame."""
+        return replace(self, patches=self.patches.turned(self.turn.T @ turn), turn=turn)
+
+    def filled(self, corners: np.ndarray, spacing: float = SPACING) -> float:
+        """Return the share of a convex piece, corners (N, 3), that lies in space that was seen empty, by points at most
+        `spacing` [m] apart."""
+        points = inside_points(corners, spacing)
+        if len(points) == 0:
+            return 0.0
+        return float(np.mean(self.free_space.is_empty(points @ self.turn.T, self.own)))
+
+    def seen_through(self, board: Piece) -> bool:
+        """Whether cameras saw that there is room below a board."""
+        low, high = board.corners.min(axis=0), board.corners.max(axis=0)
+        return self.seen_into(np.array([*low[:2], self.base]), np.array([*high[:2], low[2]]))
+
+    def seen_into(self, low: np.ndarray, high: np.ndarray) -> bool:
+        """Whether cameras saw that there is room between two corners (3,)."""
+        first, last = low + (ASIDE, ASIDE, APRON), high - (ASIDE, ASIDE, APRON)
+        return (
+            bool(np.all(last > first)) and self.filled(box_piece("room", first, last).corners, COARSE) >= SEEN_THROUGH
+        )
+
+    def has_room(self, piece: Piece) -> bool:
+        """Whether a piece does not lie in space that was seen empty."""
+        share = self.filled(piece.corners)
+        return share <= MOST_FILLED if piece.seen else share == 0.0
+
+
+def box_piece(name: str, low: np.ndarray, high: np.ndarray, *, seen: bool = True, carries: bool = False) -> Piece:
+    """Return the box between two corners (3,) as a piece; with a level surface where it `carries`."""
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    level = (np.array([low[0], low[1], high[2]]), np.asarray(high, dtype=float)) if carries else None
+    return Piece(name, corners, seen, level)
+
+
+def _counted(names: Sequence[str]) -> list[str]:
+    return [f"{names.count(name)} {name}s" if names.count(name) > 1 else name for name in dict.fromkeys(names)]

@@ -1,0 +1,1 @@
+"""Section `why`: the reasons of every entity."""
