@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.board.records import Line, by_case
-from benchmarks.board.statistics import Spread, over_rooms, paired
+from benchmarks.board.statistics import LEAST_ROOMS, Spread, over_rooms, paired
 from benchmarks.tabulation import Figure
 
 SHARES = (
@@ -125,8 +125,8 @@ def differences(place: str, first: Mapping[str, Line], second: Mapping[str, Line
 
 
 def versions_figures(versions: Sequence[Version]) -> dict[str, Figure]:
-    """Return `<commit>/versions/<part>/<case>/<measure>` of what every version of the method did in the public rooms,
-    and `<commit> less <first commit>/...`, paired by room."""
+    """Return `<commit>/versions/<part>/<case>/<measure>` of what every version of the method did in five public
+    rooms or more, and `<commit> less <first commit>/...`, paired by room."""
     figures: dict[str, Figure] = {}
     first: dict[tuple[str, str, str], dict[str, Line]] = {}
     for version in versions:
@@ -135,6 +135,8 @@ def versions_figures(versions: Sequence[Version]) -> dict[str, Figure]:
             if part != "public" or arm != "ours":
                 continue
             own = {line.trial.seed: line for line in found}
+            if len(own) < LEAST_ROOMS:
+                continue
             place = f"{version.commit}/versions/{part}/{case}"
             for name in SHARES:
                 values = [value for line in own.values() if (value := value_of(line, name)) is not None]

@@ -67,27 +67,37 @@ def read_versions(folder: Path = RECORDS / "records") -> list[Version]:
 
 
 def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, Any]:
-    """Return what docs/results/board.json holds, of the newest version and of all. Raises BadInput without any."""
+    """Return what docs/results/board.json holds, of the newest version of each part and of all. Raises BadInput without
+    any."""
     if not versions:
         raise BadInput("nothing is measured yet", hint="make board")
     newest = versions[-1]
-    figures = rooms_figures(newest.lines) | others_figures(newest.lines) | logs_figures(newest.lines)
-    figures |= versions_figures(versions)
+    commits = newest_of_parts(versions)
+    lines = [line for version in versions for line in version.lines if commits[line.trial.part] == version.commit]
+    figures = rooms_figures(lines) | others_figures(lines) | logs_figures(lines) | versions_figures(versions)
     judges = sorted({(line.trial.part, line.judge) for version in versions for line in version.lines})
+    methods = ", ".join(f"{part} {commit}" for part, commit in sorted(commits.items()))
     return {
         "experiment": "board",
         "title": "The board: figures that versions can be compared by",
-        "date": max(line.day for line in newest.lines),
+        "date": max(line.day for line in lines),
         "commit": newest.commit,
         "machine": MACHINE,
         "command": "make board",
         **ABOUT,
         "notes": f"Board {BOARD}: rooms by the generator of {GENERATOR}. Looks at sealed rooms: {len(looks)}, of "
-        f"{len({look.digest for look in looks})} methods. Judges, whose figures compare where they are the same: "
+        f"{len({look.digest for look in looks})} methods. Commits that are shown: {methods}. "
+        "Judges, whose figures compare where they are the same: "
         f"{', '.join(f'{part} {judge}' for part, judge in judges)}.",
         "figures": {name: asdict(figure) for name, figure in sorted(figures.items())},
-        "rows": {"looks": looks_rows(looks), "lines": lab_rows(newest.lines)},
+        "rows": {"looks": looks_rows(looks), "lines": lab_rows(lines)},
     }
+
+
+def newest_of_parts(versions: Sequence[Version]) -> dict[str, str]:
+    """Return part of the board -> commit of the newest version that measured it: a part takes an hour, and the figures
+    of one stand until it is measured again."""
+    return {line.trial.part: version.commit for version in versions for line in version.lines}
 
 
 def looks_rows(looks: Sequence[Look]) -> dict[str, Any]:

@@ -246,3 +246,14 @@ def test_the_published_file_is_what_the_records_say() -> None:
     content = publishing.published(versions, read_looks())
     assert publishing.PUBLISHED.read_text(encoding="utf-8") == publishing.text_of(content)
     assert json.loads(publishing.text_of(content))["experiment"] == "board"
+
+
+def test_a_part_shows_the_newest_version_that_measured_it() -> None:
+    def version(commit: str, *parts: str) -> Version:
+        lines = [
+            line().model_copy(update={"trial": Trial(part=part, case="errors", seed="a", arm="ours")}) for part in parts
+        ]
+        return Version(commit, lines)
+
+    versions = [version("0a", "public", "sealed"), version("0b", "public"), version("0c", "real")]
+    assert publishing.newest_of_parts(versions) == {"public": "0b", "sealed": "0a", "real": "0c"}
