@@ -181,7 +181,11 @@ def seeds_told(results: Results) -> str:
 
 
 def _told(names: Sequence[str]) -> str:
-    """Return, in brackets, the first names of numbered or of few seeds: many names of other things say nothing."""
+    """Return, in brackets, the first names of numbered or of few seeds: many names of other things say nothing. Seeds
+    without a gap are told by the first and the last."""
+    numbers = [int(name) for name in names if name.isdecimal()]
+    if len(numbers) > 2 and numbers == list(range(numbers[0], numbers[0] + len(names))):
+        return f" ({numbers[0]} to {numbers[-1]})"
     if all(name.isdecimal() for name in names) or len(names) <= 20:
         return f" ({', '.join(names[:20])}{', ...' * (len(names) > 20)})"
     return ""

@@ -7,7 +7,7 @@ are the detector (yolox_nano), the detector with DeepLab as its witness, and our
 each frame it is told whether it was found, in one mask or in pieces, alone or with a neighbour, and under which name;
 of each mask of a thing, whether it lies on none; and how alike the errors of a thing are in two frames from the same
 region of views, and from two regions. Boxes are rough, so that a small overlap is enough. What lies in no box counts
-for nothing. The rates that true masks are spoiled at are copied from it into data/errors/segmenters.toml.
+for nothing. It writes data/errors/segmenters.toml (`segmenters.toml` in the folder).
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ import numpy as np
 from pydantic import Field
 from scenewright.schemas.sequence import Sequence as SequenceArtifact
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.stages.agent import PrintedEyes
+from scenewright.stages.kit.acting.errors import view_region
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.kit.rendering.segmenter_errors import view_region
 from scenewright.stages.segment.choice import BackendRequest, choose_backend
 from scenewright.stages.segment.geometric import segment_depth
 from scenewright.stages.segment.parameters import SegmentParameters
@@ -44,6 +45,8 @@ from benchmarks.tabulation import Figure
 STRIDE = 4
 LEAST_PIXELS = 50
 """Of every 16th pixel that a thing must have in a frame."""
+BOUNDARY = 2.4
+"""**Assumed**: standard deviation of where masks end [pixels at a width of 640]."""
 FOUND_IOU, MASK_ON_NOTHING, COVERED, PIECE, PIECE_INSIDE = 0.3, 0.1, 0.5, 0.15, 0.8
 """A thing is found by a mask of this overlap (over union); a mask that shares less than the second of itself with
 things is a false one; a mask that covers the third of two things merges them; pieces are masks of at least the fourth
@@ -122,9 +125,48 @@ def main() -> None:
         (options.out / f"sights_{name.replace(' ', '_')}.json").write_text(json.dumps(raw) + "\n")
         print(name, json.dumps(made[name], indent=1))
     file.write_text(json.dumps({**made, "logs": logs}, indent=1) + "\n")
+    named = {"detector": made["detector"], "network": made["our network"]}
+    (options.out / "segmenters.toml").write_text(rates_file(named, len(logs)))
     write_figures(
         options.out, "segmenter_rates", ABOUT, figures_of({name: made[name] for name in segmenters if name in made})
     )
+
+
+def rates_file(made: Mapping[str, Mapping[str, Any]], logs: int) -> str:
+    """Return data/errors/segmenters.toml: the rates that simulated segmenters err at. Where two regions of views came
+    out more alike than one, both have the greater value."""
+    printed = PrintedEyes()
+    counts = ", ".join(f"{name}: {own['sights']} sights" for name, own in made.items())
+    about = [
+        "What segmenters get wrong, for simulated eyes and masks: written by `python -m benchmarks.segmenter_rates`.",
+        f"{counts} of things on {logs} annotated logs.",
+        "Boxes of the annotation are rough, so that missed and merged are upper bounds. thesis: table 3.4 (Han 2024).",
+        "Missed, merged, split and wrong_name are shares of all sights, false_masks is a frame; boundary (assumed) in",
+        "pixels at a width of 640. confusion: true class -> wrong class -> sights; without it, any class asked for.",
+    ]
+    lines = [f"# {line}" for line in about]
+    lines += ["", "[thesis]", f"missed = {printed.missed:.4f}", "merged = 0.0", "split = 0.0"]
+    lines += [f"wrong_name = {printed.wrong_name:.4f}", "false_masks = 0.0", "boundary = 0.0"]
+    lines += ["missed_alike = { same_region = 1.0, other_region = 0.0 }"]
+    lines += [f"name_alike = {{ same_region = 1.0, other_region = {printed.other_region:.3f} }}"]
+    for name, own in made.items():
+        lines += ["", f"[{name}]"]
+        lines += [f"{rate} = {own[rate]:.3f}" for rate in ("missed", "merged", "split", "wrong_name")]
+        lines += [f"false_masks = {own['false_masks_a_frame']:.3f}", f"boundary = {BOUNDARY}"]
+        for key, error in (("missed_alike", "missed"), ("name_alike", "wrong_name")):
+            other = own["alike"][error]["other_region"]
+            same = max(own["alike"][error]["same_region"], other)
+            lines.append(f"{key} = {{ same_region = {same:.3f}, other_region = {other:.3f} }}")
+        lines.append(f"false_names = {_table(own['false_names'])}")
+        wrong = {
+            true: {name: count for name, count in row.items() if name != true} for true, row in own["confusion"].items()
+        }
+        lines.append("confusion = { " + ", ".join(f"{k} = {_table(row)}" for k, row in wrong.items() if row) + " }")
+    return "\n".join(lines) + "\n"
+
+
+def _table(row: Mapping[str, int]) -> str:
+    return "{ " + ", ".join(f"{name} = {count}" for name, count in row.items()) + " }"
 
 
 def figures_of(rates: Mapping[str, Mapping[str, Any]]) -> dict[str, Figure]:

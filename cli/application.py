@@ -26,7 +26,7 @@ def build_application() -> Callable[..., Any]:
         help=HELP, no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
     )
     groups: dict[str, typer.Typer] = {}
-    two_words = {("urdf", "check"), ("urdf", "settle")}
+    two_words = {("urdf", "check"), ("urdf", "settle"), ("urdf", "protocol")}
     ours = {function.__name__ for function, _ in housekeeping.COMMANDS} | {
         name for name, *_ in (*housekeeping.GROUPS, *housekeeping.ALONE)
     }

@@ -23,6 +23,7 @@ from scenewright.cli.serve_command import serve
 from scenewright.cli.show_command import show
 from scenewright.cli.timeline_command import timeline
 from scenewright.cli.urdf_check_command import urdf_check
+from scenewright.cli.urdf_protocol_command import urdf_protocol
 from scenewright.cli.urdf_settle_command import urdf_settle
 from scenewright.cli.view_command import view
 from scenewright.cli.weights_command import convert_weights
@@ -303,6 +304,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (verify, "Artifacts"),
     (urdf_check, "Artifacts"),
     (urdf_settle, "Artifacts"),
+    (urdf_protocol, "Artifacts"),
     (accept_code, "Artifacts"),
     (migrate, "Artifacts"),
     (diff, "Artifacts"),

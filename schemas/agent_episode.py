@@ -72,8 +72,14 @@ class EpisodeFile(Model):
     perception: float
     segmenter: str = Field("", exclude_if=lambda identity: not identity)
     """What the segmentation service says it is whose masks the robot saw by. Absent: an oracle with errors."""
+    segmenter_errors: Literal["thesis", "detector", "network"] = Field(
+        "thesis", exclude_if=lambda name: name == "thesis"
+    )
+    """Whose errors a simulated segmenter made. Absent: those that the thesis prints."""
     robot: str = Field("panda", exclude_if=lambda name: name == "panda")
     """Name of the robot, as its description has it. Absent: the Panda, or the fast world, where there is none."""
+    room: str = Field("", exclude_if=lambda digest: not digest)
+    """Content digest of the ground truth whose room the robot lived in, in physics. Absent: apartment.json is all."""
     most_turns: int = Field(ge=1)
     end: str
     """`done`, `give_up`, `ask`; `turns`, `time`, `repeats`: a limit; `brain`: no usable answer."""

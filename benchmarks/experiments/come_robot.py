@@ -24,9 +24,8 @@ from scenewright.stages.agent import (
 from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Share, Trial, count, mean, pooled
 from benchmarks.tabulation import Figure, markdown
 
-TUNING, REPORTING = (*range(1100), *range(2000, 2100), *range(4000, 4100), *range(5000, 5200)), range(5200, 5300)
-"""Versions 1, 3, 4, 5 and 8 were reported on seeds 1000 to 1099, 2000 to 2099, 4000 to 4099, 5000 to 5099 and 5100 to
-5199: they were seen."""
+TUNING, REPORTING = (*range(1100), *range(2000, 2100), *range(4000, 4100), *range(5000, 5300)), range(5300, 5400)
+"""Seeds of TUNING from 1000 on were reported on by earlier versions: they were seen."""
 RIVALS = ("open_loop", "bool_feedback", "thesis", "ours", "oracle")
 FAST = tuple(f"{task}/fast" for task in TASKS)
 MIXED = "mixed/fast"

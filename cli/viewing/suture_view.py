@@ -15,6 +15,7 @@ from scenewright.stages.kit.formats.numpy_files import read_arrays
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.viewing.canvas import Canvas
 from scenewright.stages.kit.viewing.meshes import draw_solid
+from scenewright.stages.suture import NEEDLE_RADIUS, REMOTE_CENTRES, RIDGE_HALF_WIDTH, RIDGE_HEIGHT, YAW_TO_TIP
 
 STEEL, THREAD, TIP, TRUE = (0.75, 0.2, 0.18), (0.48, 0.31, 0.69), (0.9, 0.55, 0.1), (0.2, 0.7, 0.3)
 """Colours of estimated needle, thread and tip, and of the truth (sRGB, 0 to 1)."""
@@ -22,14 +23,9 @@ ARM_COLORS = ((0.18, 0.44, 0.7), (0.3, 0.6, 0.42))
 """Colours of the right and the left arm (sRGB, 0 to 1)."""
 PAD = (0.12, 0.12, 0.004)
 """Size of the pad [m]."""
-RIDGE = (0.005, 0.05, 0.005)
-"""Half its width, half its length, its height [m]: half an ellipse across, as the simulator has it."""
-REMOTE_CENTRES = ((-0.12, 0.0, 0.15), (0.12, 0.0, 0.15))
-"""Remote centres of the right and the left arm [m]: every shaft goes through its own."""
-NEEDLE_RADIUS = 0.012
-"""Radius of the needle's arc in a trial [m]."""
-JAW = 0.0102
-"""Distance of the wrist from the tip of the jaws [m]."""
+HALF_LENGTH = 0.05
+"""Half the drawn length of the wound [m]."""
+ARMS = ("right", "left")
 WIRE, LINE = 0.0005, 0.0003
 """Radii of the drawn needle and thread [m]."""
 ARC = np.linspace(0.0, np.pi, 40)
@@ -142,8 +138,8 @@ def _pose(path: str, estimate: NeedleEstimateRecord, radius: float, canvas: Canv
 
 def ridge() -> trimesh.Trimesh:
     """Return the raised wound as a mesh [m]."""
-    x, z = RIDGE[0] * np.cos(ARC), RIDGE[2] * np.sin(ARC)
-    ends = [np.stack([x, np.full_like(x, y), z], axis=1) for y in (-RIDGE[1], RIDGE[1])]
+    x, z = RIDGE_HALF_WIDTH * np.cos(ARC), RIDGE_HEIGHT * np.sin(ARC)
+    ends = [np.stack([x, np.full_like(x, y), z], axis=1) for y in (-HALF_LENGTH, HALF_LENGTH)]
     return trimesh.Trimesh(np.concatenate(ends)).convex_hull
 
 
@@ -155,10 +151,10 @@ def _needle(pose: np.ndarray, canvas: Canvas) -> None:
 
 def _driver(arm: int, tool: np.ndarray, canvas: Canvas) -> None:
     """Draw a driver's jaw, along the tool's z, and its shaft from the wrist to the arm's remote centre."""
-    tip, wrist = tool[:3, 3], tool[:3, 3] - JAW * tool[:3, 2]
+    tip, wrist = tool[:3, 3], tool[:3, 3] - YAW_TO_TIP * tool[:3, 2]
     canvas.line(
-        f"driver_{('right', 'left')[arm]}",
-        [np.stack([tip, wrist]), np.stack([wrist, np.array(REMOTE_CENTRES[arm])])],
+        f"driver_{ARMS[arm]}",
+        [np.stack([tip, wrist]), np.stack([wrist, REMOTE_CENTRES[ARMS[arm]]])],
         [ARM_COLORS[arm], ARM_COLORS[arm]],
         radius=0.0015,
     )

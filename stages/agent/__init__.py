@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from scenewright.stages.agent.judging import CAUSES, Score, score
     from scenewright.stages.agent.tasks import TASKS, THESIS_TASKS, make_apartment
     from scenewright.stages.agent.trials import Setting, run_trial
-    from scenewright.stages.agent.world.failures import TABLE_3_4, Rates
+    from scenewright.stages.agent.world.failures import TABLE_3_4, PrintedEyes, Rates
     from scenewright.stages.agent.world.floor import Floor
 
 __getattr__ = exported(__name__)

@@ -30,11 +30,6 @@ class Body(Protocol):
         ...
 
     @property
-    def enough(self) -> int:
-        """Regions of views by which a class has to be ahead before anything is done about it."""
-        ...
-
-    @property
     def stand_off(self) -> float:
         """Of the middle of the base from the edge of furniture on which it works [m]."""
         ...

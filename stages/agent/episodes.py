@@ -30,6 +30,7 @@ from scenewright.stages.agent.scene_map import SceneMap
 from scenewright.stages.agent.session import Session, Turn
 from scenewright.stages.agent.trials import Setting, run_trial
 from scenewright.stages.agent.world.truth import World
+from scenewright.stages.kit.acting.eyes.options import SegmenterName
 from scenewright.stages.kit.language.failures import LanguageFailed
 from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
@@ -100,10 +101,13 @@ def write_episode(
     label: str,
     width: int,
     segmenter: str = "",
+    segmenter_errors: SegmenterName = "thesis",
     robot: str = USUAL_ROBOT,
+    room: str = "",
 ) -> AgentEpisode:
     """Run a trial and write it down. `language` says, when it is over, what was asked of a model; `segmenter` is what
-    the service that was asked for masks says it is, `robot` the name that its description has."""
+    the service that was asked for masks says it is, `segmenter_errors` whose errors a simulated one made, `robot` the
+    name that its description has, `room` the digest of the truth whose room it was in."""
     watching = Watching()
     session, world = run_trial(setting, arm, brain, one_program=one_program, watch=watching.see)
     scored = score(setting.goals, impossible, session, world)
@@ -119,7 +123,9 @@ def write_episode(
         failures=scales[0],
         perception=scales[1],
         segmenter=segmenter,
+        segmenter_errors=segmenter_errors,
         robot=robot,
+        room=room,
         most_turns=setting.limits.turns,
         end=session.end,
         said=session.words,

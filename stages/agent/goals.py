@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 FRUIT = ("apple", "banana", "orange", "lemon")
 TOYS = ("doll", "teddy", "duck", "toy car")
 CATEGORIES = {"fruit": FRUIT, "toy": TOYS}
 """What every child knows: a word for several classes."""
-FURNITURE = ("table", "bed", "sofa", "shelf", "fridge", "dresser", "desk", "cabinet")
+FURNITURE = (
+    *("table", "bed", "sofa", "shelf", "fridge", "dresser", "desk", "cabinet"),
+    *("drawer unit", "wardrobe", "chest", "chair", "stool", "bench", "trolley", "bin"),
+)
 BOXES = ("fruit box", "toy box")
-CARRIERS = ("plate", *BOXES)
+CARRIERS = ("plate", "tray", *BOXES)
 """Small things on which others are put."""
 SMALL = (*FRUIT, *TOYS, "cup", "bottle", "can", "spoon", "sponge")
-THINGS = (*FRUIT, *TOYS, *CARRIERS, "cup", "bottle", "can", "spoon", "sponge", "book", "teapot", "bowl", "box")
+THINGS = (
+    *(*FRUIT, *TOYS, *CARRIERS, "cup", "bottle", "can", "spoon", "sponge", "book", "teapot", "bowl", "box"),
+    *("jug", "kettle", "cooking pot", "pan", "vase", "keyboard", "mouse", "laptop", "remote", "toolbox", "backpack"),
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,8 @@ class Move:
     onto: Description
     every: bool = False
     start: str = ""
+    inside: bool = field(default=False, compare=False)
+    """Words say that it goes in there, not on top."""
 
 
 @dataclass(frozen=True)

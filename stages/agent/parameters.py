@@ -5,40 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import Field, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 from scenewright.schemas.agent_episode import AgentEpisode, AgentEvaluation
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.interactive_scene import InteractiveScene
+from scenewright.stages.kit.acting.errors import RATES_NAME
+from scenewright.stages.kit.acting.eyes.options import SegmenterParameters
 from scenewright.stages.kit.language.options import LanguageParameters
-from scenewright.stages.kit.services.address import SEGMENTATION, check_address
 from scenewright.stages.kit.simulation.robot_option import check_robot_acts, robot_files, robot_option
-from scenewright.stages.kit.stage import NOT_SHOWN, External, Optionally, Parameters, Stage
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 ArmName = Literal["open_loop", "bool_feedback", "thesis", "ours", "oracle"]
 RECIPE, SHAPES = "agent/apartment.toml", "agent/things.toml"
 
 
-class EyesParameters(Parameters):
-    """Who names what the cameras of the physics world see."""
-
-    segmenter: str = Field(
-        "",
-        description="Address of a segmentation service, any backend of `segment` (`scenewright models serve`), whose "
-        "masks are all that the robot sees by in physics; empty: an oracle with errors",
-    )
-
-    @field_validator("segmenter")
-    @classmethod
-    def _names_a_service(cls, address: str) -> str:
-        try:
-            return check_address(address, form=SEGMENTATION) if address else ""
-        except ValueError as error:
-            raise PydanticCustomError(NOT_SHOWN, "{reason}", {"reason": str(error)}) from None
-
-
-class RunParameters(LanguageParameters, EyesParameters):
+class RunParameters(LanguageParameters, SegmenterParameters):
     """Options of `agent run`. The apartment follows from the task and --seed, or is --world."""
 
     task: str = Field("place_fruit", description="Name of a built-in task, or what you want in words (docs/AGENT.md)")
@@ -56,7 +38,7 @@ class RunParameters(LanguageParameters, EyesParameters):
     image_width: int = Field(1200, ge=300, le=4000, description="Width of the picture [px]")
 
 
-class ReplayParameters(EyesParameters):
+class ReplayParameters(SegmenterParameters):
     """Options of `agent replay`."""
 
     robot: str = robot_option("the one that did the episode")
@@ -78,10 +60,10 @@ def check_run(parameters: RunParameters, inputs: Mapping[str, Any]) -> None:
     """Raise UsageError for options that do not go together."""
     if not parameters.task.strip():
         raise UsageError("--task is empty", hint="say what you want, or name a built-in task")
-    if (inputs.get("scene") is None) != (inputs.get("truth") is None):
-        raise UsageError("--scene and --truth go together", hint="what the robot knows, and the room it is in")
-    if inputs.get("scene") is not None and inputs.get("world") is not None:
-        raise UsageError("--world and --scene are two rooms", hint="give one of them")
+    if inputs.get("scene") is not None and inputs.get("truth") is None:
+        raise UsageError("--scene is what the robot knows of a room", hint="give --truth, the room it is in, too")
+    if inputs.get("truth") is not None and inputs.get("world") is not None:
+        raise UsageError("--world and --truth are two rooms", hint="give one of them")
     acts = parameters.simulation == "physics"
     check_robot_acts(parameters, acts=acts, without="the fast world has no arm", hint="give --simulation physics too")
     if parameters.segmenter and parameters.simulation != "physics":
@@ -112,7 +94,9 @@ RUN = Stage(
     module="run_stage",
     versions="segmenter_identity",
     data_files=lambda parameters: (
-        (RECIPE, SHAPES, *robot_files(parameters.robot)) if parameters.simulation == "physics" else (RECIPE,)
+        (RECIPE, RATES_NAME, SHAPES, *robot_files(parameters.robot))
+        if parameters.simulation == "physics"
+        else (RECIPE, RATES_NAME)
     ),
     check=check_run,
     example='scenewright agent run --task "Put all the fruit onto the plate." --seed 3 --out outputs/agent/episode',
@@ -121,12 +105,12 @@ REPLAY = Stage(
     name="agent replay",
     summary="Do an episode again with the programs that its brain wrote: the same bytes, nobody is asked",
     parameters=ReplayParameters,
-    reads={"episode": AgentEpisode},
+    reads={"episode": AgentEpisode, "truth": Optionally(GroundTruth)},
     writes=AgentEpisode,
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="replay_stage",
     versions="segmenter_identity",
-    data_files=lambda parameters: (RECIPE, SHAPES, *robot_files(parameters.robot)),
+    data_files=lambda parameters: (RECIPE, RATES_NAME, SHAPES, *robot_files(parameters.robot)),
     example="scenewright agent replay --episode outputs/agent/episode --out outputs/agent/again",
 )
 EVALUATE = Stage(
@@ -137,7 +121,7 @@ EVALUATE = Stage(
     writes=AgentEvaluation,
     libraries=("numpy", "scipy", "numba"),
     module="evaluate_stage",
-    data_files=lambda parameters: (RECIPE, SHAPES),
+    data_files=lambda parameters: (RECIPE, RATES_NAME, SHAPES),
     example="scenewright agent evaluate --trials 20 --out outputs/agent/evaluation",
 )
 STAGES = [RUN, REPLAY, EVALUATE]

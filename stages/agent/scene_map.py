@@ -11,7 +11,7 @@ from scenewright.stages.agent.body import Body
 from scenewright.stages.agent.goals import BOXES, CARRIERS, SMALL
 from scenewright.stages.agent.language.values import ObjectMap, SceneObject
 from scenewright.stages.agent.senses import Base, Detection, Position, SeenFurniture, Sweep
-from scenewright.stages.kit.rendering.segmenter_errors import quarter_turn
+from scenewright.stages.kit.acting.errors import quarter_turn
 
 SAME_FURNITURE = 0.3
 """Two sightings of furniture this near are of one piece [m], and those of a class whose boxes overlap."""
@@ -26,6 +26,8 @@ TWICE = 0.5
 """Share of the distance of one thing within which a second detection of one look is of it as well; by eye."""
 CARRIES = 0.09
 """Radius from which on a thing can be a plate or a box, and up to which it can be something that goes onto one [m]."""
+TOP = 0.08
+"""What lies no farther than this below the top of furniture is on it [m]; by eye."""
 FLOOR, PATCH = "floor", 0.1
 """What the floor under a thing is called, and its edge [m]."""
 Region = tuple[int | str, bool]
@@ -101,6 +103,11 @@ class Item:
         return sum(1 if used else -1 for used in self.used_votes.values())
 
 
+ENOUGH = 2
+"""Regions of views by which a class has to be ahead before anything is done about it: what is wrong from two is mostly
+wrong for good (data/errors/segmenters.toml), and a third region is mostly a drive away."""
+
+
 class SceneMap:
     """Furniture and things by key, names given in the order in which they were found."""
 
@@ -111,14 +118,22 @@ class SceneMap:
         self.items: dict[str, Item] = {}
         self.obstacles = body.obstacles
         self._named: Counter[str] = Counter()
-        self._same_thing, self._enough = body.same_thing, body.enough
+        self._same_thing = body.same_thing
+        self._body = body
 
     def know(self, before: Mapped) -> None:
-        """Believe in what somebody mapped before, the things as if one view had shown them."""
+        """Believe in what somebody mapped before, the things as if one view had shown them. That a door is open is
+        believed where none has to be looked at to be got past."""
         self.obstacles.add(before.floor)
-        keys = [self._enter(piece_seen) for piece_seen in before.floor.furniture]
+        looks = self._body.short_armed
+        known = (replace(piece, opened=piece.opened and not looks) for piece in before.floor.furniture)
+        ajar = {piece.label for piece in before.floor.furniture if piece.opened and looks}
+        seen = [piece for piece in self.furniture.values() if piece.label in ajar]
+        keys = [self._enter(piece) for piece in known]
         for number, detection in before.things:
             self.add(detection, keys[number], MAPPED)
+        for piece in seen:  # a door that stands open is no part of the furniture as it was seen
+            self._enter(piece)
 
     def sweep(self, body: Body) -> None:
         """Turn the head camera around and enter the furniture that it saw."""
@@ -218,11 +233,15 @@ class SceneMap:
         """Return a thing or piece of furniture as programs see it."""
         if key in self.furniture:
             piece = self.furniture[key]
-            return SceneObject(key, piece.label, door=piece.door, opened=piece.opened)
+            return SceneObject(key, piece.label, door=piece.door, opened=piece.opened, top=piece.top, more=piece.more)
         item = self.items[key]
-        doubt, ahead = (item.doubt, min(item.margin, self._enough)) if self.careful else ("", 0)
+        doubt, ahead = (item.doubt, min(item.margin, ENOUGH)) if self.careful else ("", 0)
         on = self.carrier_of(item)
-        return SceneObject(key, item.label, item.place, item.color, item.used, on=on, doubt=doubt, ahead=ahead)
+        under = self.furniture.get(item.place)
+        above = under is not None and under.top and item.position[2] > under.height - TOP
+        return SceneObject(
+            key, item.label, item.place, item.color, item.used, top=above, on=on, doubt=doubt, ahead=ahead
+        )
 
     def global_map(self) -> ObjectMap:
         """Return the furniture."""

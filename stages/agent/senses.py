@@ -36,6 +36,10 @@ class SeenFurniture:
     opened: bool
     open_to: float | None = None
     """Heading out of a shelf [rad] whose leaf is open: it is looked and got into from there alone."""
+    top: bool = False
+    """Things lie on its top as well: they are got at with its door closed."""
+    more: bool = False
+    """It has doors or drawers that were not opened yet: to open it once more opens the next one."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from scenewright.schemas.apartment import Apartment
@@ -14,14 +15,14 @@ from scenewright.stages.agent.brains.open_loop import OpenLoopBrain
 from scenewright.stages.agent.brains.rules import RulesBrain
 from scenewright.stages.agent.brains.slips import Slips
 from scenewright.stages.agent.brains.words import NotUnderstood, understood
-from scenewright.stages.agent.goals import Goal, sought
+from scenewright.stages.agent.goals import FURNITURE, THINGS, Goal, sought
 from scenewright.stages.agent.session import Limits, Session, Turn, run_session
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.fast import FastWorld
 from scenewright.stages.agent.world.floor import Floor
 from scenewright.stages.agent.world.reconstructed import mapped
 from scenewright.stages.agent.world.truth import World
-from scenewright.stages.kit.rendering.segmenter_errors import Luck
+from scenewright.stages.kit.acting.errors import Luck
 from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 WorldName = Literal["fast", "physics"]
@@ -43,6 +44,8 @@ class Setting:
     world: WorldName = "fast"
     known: Apartment | None = None
     """What was mapped of it before the robot came, as far as it is right."""
+    room: Path | None = None
+    """Folder of the true scene that `apartment` describes: in physics the robot lives in its bodies as they are."""
     segmenter: str = ""
     """Address of the segmentation service that the eyes ask in physics; empty: the oracle with errors."""
     robot: str = USUAL_ROBOT
@@ -64,14 +67,18 @@ def open_world(setting: Setting, arm: str) -> World:
     """
     rates = setting.rates.with_true_eyes() if ARMS[arm].true_eyes else setting.rates
     if setting.world == "physics":
-        from scenewright.stages.agent.world.physics.body import PhysicsBody  # heavy: pybullet and Open3D
+        from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom  # heavy: pybullet and Open3D
+        from scenewright.stages.agent.world.physics.body import PhysicsBody
+        from scenewright.stages.agent.world.physics.scene_room import SceneRoom
 
         segmenter = None
         if setting.segmenter:
-            from scenewright.stages.agent.world.physics.asked import AskedSegmenter
+            from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter
 
-            segmenter = AskedSegmenter(setting.segmenter, setting.seed)
-        return PhysicsBody(setting.apartment, sought(setting.goals), rates, setting.seed, segmenter, setting.robot)
+            segmenter = AskedSegmenter(setting.segmenter, setting.seed, (*THINGS, *FURNITURE))
+        apartment = setting.apartment
+        room = ApartmentRoom(apartment) if setting.room is None else SceneRoom(setting.room, apartment)
+        return PhysicsBody(room, sought(setting.goals), rates, setting.seed, segmenter, setting.robot)
     return FastWorld(setting.apartment, sought(setting.goals), rates, setting.seed, setting.floor)
 
 

@@ -2,7 +2,7 @@
 
 Ours. Each look either names the thing, names it wrongly, or says nothing. How often the masks of this log name things
 says how much their silence means. Rooms hold some things more often than others, and each within a range of sizes:
-that is the prior. The name with the largest posterior is taken if looks are evidence for it; else it is an `object`.
+that is the prior. The name with the largest posterior is taken if it is likelier than not; else it is an `object`.
 A mask that calls a thing a wall, floor or window is silent about which thing it is.
 """
 
@@ -37,8 +37,6 @@ LOOKS = 8.0
 """Looks are alike: however many there are, they count for fewer than so many."""
 LIKELY = 0.5
 """Posterior from which on a name is given."""
-EVIDENCE = float(np.log(3.0))
-"""Log Bayes factor from which on looks are evidence for a name, whatever its prior (Kass and Raftery 1995)."""
 UNUSUAL = 1.5
 """A thing may be this much larger than usual where masks are as sure of its name as they usually are."""
 
@@ -114,16 +112,16 @@ def name_of(said: Said, rates: Rates, extent: float, vocabulary: Vocabulary, unn
     none = np.log(1.0 - rates.background) * silent + np.log(rates.background / CLASSES) * spoken
     silence = np.log(max(1.0 - rates.right - rates.wrong, SILENT)) * silent
     effective = LOOKS * said.looks / (said.looks + LOOKS)
-    factors = {
-        c: effective
+    odds = {
+        c: np.log(prior_odds(vocabulary.by_id(c).name))
+        + effective
         * (s * np.log(rates.right) + (spoken - s) * np.log(rates.wrong / CLASSES) + silence - doubt * DOUBT - none)
         for c, s in possible.items()
     }
-    odds = {c: np.log(prior_odds(vocabulary.by_id(c).name)) + factor for c, factor in factors.items()}
     order = sorted(odds, key=lambda c: (-odds[c], c))
     weights = np.exp(np.minimum([odds[c] for c in order], 50.0))
     rows = [(c, round(float(w / (1.0 + weights.sum())), 3)) for c, w in zip(order, weights, strict=True)]
-    if rows and rows[0][1] >= LIKELY and factors[rows[0][0]] >= EVIDENCE:
+    if rows and rows[0][1] >= LIKELY:
         return Naming(*rows[0], tuple(rows[1:3]), "the likeliest of the names that masks gave it")
     left = round(1.0 - sum(p for _, p in rows), 3)
     rule = "no name is likely enough" if rows else "no thing of its size has its name" if names else "nobody named it"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.motion.grasps import narrowest_width
 from scenewright.stages.kit.motion.kinematics import reach, shoulder_height
@@ -10,7 +11,6 @@ from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.world import FRICTION, GRAVITY
 from scenewright.stages.kit.tasks.strips import Atom
 from scenewright.stages.plan.regions import Region
-from scenewright.stages.plan.rim_grasps import has_rim
 from scenewright.stages.plan.world_model import WorldModel
 
 LAYOUT = ("floor", "wall", "ceiling")
@@ -91,3 +91,9 @@ def _of_support(model: WorldModel, name: str, feet: dict[str, tuple[float, float
 def _height(model: WorldModel, region: Region) -> float:
     middle = np.array([*(region.low + region.high) / 2, region.level])
     return float(apply(model.world_from_region(region), middle)[2])
+
+
+def has_rim(model: WorldModel, item: str, uncertainty: float) -> bool:
+    """Whether a thing can be lifted by its rim, which may be up to `uncertainty` [m] higher than it looks."""
+    random = np.random.default_rng(0)
+    return bool(rim_grasps(model.points(item), model.pose(item), random, uncertainty=uncertainty))

@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.acting.errors import quarter_turn
+from scenewright.stages.kit.acting.eyes.masks import Segmenter
 from scenewright.stages.kit.geometry.cameras import scaled
 from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
-from scenewright.stages.kit.rendering.object_views import LEAST_PIXELS, View, cloud, take
-from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors, quarter_turn
+from scenewright.stages.kit.rendering.object_views import View, cloud, take
 from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
 from scenewright.stages.plan.affordances import CARRIER_CLASSES
 from scenewright.stages.plan.correspondence import alike
 from scenewright.stages.plan.erring_robot import ErringRobot
-from scenewright.stages.plan.eyes import CELL, NEAR_BY, Room, Seen
+from scenewright.stages.plan.eyes import Seen
 from scenewright.stages.plan.furniture_fit import FittedFurniture, Range, fit_furniture
 from scenewright.stages.plan.pictures import RoomPictures
 from scenewright.stages.plan.pose_fit import fit_upright
@@ -39,6 +40,8 @@ HIDDEN = 0.015
 """A carrier that looks smaller or larger than it is by more is partly hidden, or taken with what is beside it [m]."""
 MOST_TURNED = 0.2
 """Furniture is turned no farther than this from how the map has it [rad]."""
+NEAR_BY = 1.5
+"""Largest distance of a look from near by [m]."""
 SAME = 0.1
 """Clouds of two cameras this near to each other are of one thing [m]."""
 LEAST_POINTS = 40
@@ -76,17 +79,14 @@ class CameraEyes:
     def __init__(
         self,
         model: WorldModel,
-        room: Room,
         pictures: RoomPictures,
         robot: ErringRobot,
-        errors: SegmenterErrors,
+        segmenter: Segmenter,
         random: np.random.Generator,
         radius: float,
     ) -> None:
-        self._model, self._room, self._pictures, self._robot = model, room, pictures, robot
-        self._errors, self._random, self._radius = errors, random, radius
-        self._names = dict(enumerate(room.records, start=1))
-        """Instance number of a picture -> body of the room."""
+        self._model, self._pictures, self._robot = model, pictures, robot
+        self._segmenter, self._random, self._radius = segmenter, random, radius
         self._mapped = {name: model.pose(name) for name, record in model.records.items() if not record.carriable}
         """Furniture -> where the map has it (4, 4)."""
         self._parts: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
@@ -235,14 +235,17 @@ class CameraEyes:
             low = high = (low + high) / 2  # of furniture any side may be in sight
         renderer = self._pictures.sight(self._robot.world)
         thing_points, pictures = np.zeros((0, 3)), []
+        base = self._robot.robot.configuration().base
+        at = self._believed_middle(body)
+        region = quarter_turn(base.tolist(), at.tolist()), bool(np.hypot(*(base - at)[:2]) < NEAR_BY)
         for eye, target in views:
             pose = look_at(eye, target)
             picture = take(renderer, camera, pose, self._random)
             clouds = [
                 points
-                for number in np.unique(picture.instance)
-                if self._is_recognised(int(number), picture.instance == number, class_name)
-                and len(points := cloud(picture, picture.instance == number, map_from_true @ pose, whole=not carriable))
+                for entry in self._segmenter.masks(picture, map_from_true @ pose, region)
+                if alike(entry.label, class_name)
+                and len(points := cloud(picture, entry.mask, map_from_true @ pose, whole=not carriable))
                 and not self._of_another(body, class_name, points)
             ]
             if carriable and len(thing_points):
@@ -272,15 +275,3 @@ class CameraEyes:
         ]
         nearest = min(map(away, others), default=np.inf)
         return nearest < min(SAME, away(body))
-
-    def _is_recognised(self, number: int, mask: np.ndarray, class_name: str) -> bool:
-        """Whether the segmentation takes an instance of a picture for something of a class."""
-        name = self._names.get(number, "")
-        if not name or mask.sum() < LEAST_PIXELS:
-            return False
-        at = self._robot.world.pose(name)[:2, 3]
-        base = self._robot.robot.configuration().base
-        view = (quarter_turn(base.tolist(), at.tolist()), bool(np.hypot(*(base[:2] - at)) < NEAR_BY))
-        if self._errors.misses(name, hash(tuple(np.rint(at / CELL).astype(int).tolist())), *view):
-            return False
-        return alike(self._errors.class_of(name, self._room.records[name].class_name, *view), class_name)

@@ -15,9 +15,9 @@ from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import forward
 from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
 from scenewright.stages.kit.motion.segments import Segment, whole_body
+from scenewright.stages.kit.simulation.carriers import NOTHING, carrier
 from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.plan.action import MotionRequest, action_named
-from scenewright.stages.plan.carriers import NOTHING, carrier
 from scenewright.stages.plan.correspondence import match_joint
 from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Eyes, Room
@@ -142,7 +142,8 @@ class Conduct:
                 style = grasp_style(self.model, arguments[0], following) if action.hand == "takes" else "any"
                 further = put_there_later(name, arguments, following)
                 request = MotionRequest(arguments, self.budgets, self.random, preferred, style, further=further)
-                looks_again = self.eyes is not None and self.eyes.again
+                # eyes may have erred from afar, and what is held turns in the fingers on the way
+                looks_again = state.holding is not None or (self.eyes is not None and self.eyes.again)
                 before = self.model.snapshot() if looks_again else None
                 steps, after = refine_action(self.model, state, name, request, origin)
             except MotionFailed as failed:

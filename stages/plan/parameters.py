@@ -12,14 +12,16 @@ from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.language_map import LanguageMap
 from scenewright.schemas.plan import Plan
 from scenewright.schemas.sequence import Sequence
+from scenewright.stages.kit.acting.errors import RATES_NAME
+from scenewright.stages.kit.acting.eyes.options import SegmenterParameters
 from scenewright.stages.kit.estimates import grows_with
 from scenewright.stages.kit.simulation.robot_option import robot_files, robot_option
-from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
+from scenewright.stages.kit.stage import External, Optionally, Stage
 
 STAND = "--stand X --stand Y --stand YAW, in metres and degrees"
 
 
-class PlanParameters(Parameters):
+class PlanParameters(SegmenterParameters):
     """Options of `plan`. Budgets count attempts, never seconds."""
 
     goal: tuple[str, ...] = Field(
@@ -55,11 +57,11 @@ class PlanParameters(Parameters):
         description="Before each action the robot sees pose and shape of the bodies that the action names, as they "
         "are in the room of execution (stands for a look with a wrist camera); off: the planned motion is replayed",
     )
-    eyes: Literal["true", "noisy", "camera"] = Field(
+    eyes: Literal["true", "camera"] = Field(
         "true",
-        description="What a look tells: the truth; noisy: the truth through a localisation and encoders that err and a "
-        "segmentation that misses things and takes them for others; camera: poses and joint values fitted to rendered "
-        "depth pictures through the same. The robot's own errors are there when a planned motion is replayed, too",
+        description="What a look tells: the truth; camera: poses and joint values fitted to rendered depth pictures, "
+        "through a segmenter, a localisation and encoders that err. The robot's own errors are there when a planned "
+        "motion is replayed, too",
     )
     match_radius: float = Field(
         0.5, gt=0, le=5, description="A body is the nearest of its class in the true room within this [m]"
@@ -92,7 +94,7 @@ class PlanParameters(Parameters):
 
 def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
     """Return the files of `data/` that describe the robot, and what words need."""
-    return (*robot_files(parameters.robot), "words/two_towers.safetensors", "words/calibration.toml")
+    return (*robot_files(parameters.robot), RATES_NAME, "words/two_towers.safetensors", "words/calibration.toml")
 
 
 def check_options(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
@@ -101,6 +103,8 @@ def check_options(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None
         raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     if parameters.stand and len(parameters.stand) != 3:
         raise UsageError(f"--stand has {len(parameters.stand)} values", hint=STAND)
+    if parameters.eyes == "true" and (parameters.segmenter or parameters.segmenter_errors != "thesis"):
+        raise UsageError("with --eyes true nothing is segmented", hint="give --eyes camera too")
     if inputs.get("domain") is not None and parameters.planner != "builtin":
         raise UsageError("--planner fast-downward plans in the scene's own domain", hint="leave --domain or it out")
 
@@ -118,6 +122,7 @@ STAGE = Stage(
     },
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
+    versions="segmenter_identity",
     data_files=plan_files,
     check=check_options,
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -17,9 +18,8 @@ from scenewright.stages.kit.motion.grasps import Grasp, narrowest_width, sample_
 from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
-from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements
-from scenewright.stages.plan.rim_grasps import rim_grasps
-from scenewright.stages.plan.tray_loading import easiest_first, lifts_left, lifts_left_beside, load_moments
+from scenewright.stages.plan.placements import PLACES, Placement, place_regions, sample_placements, untaken
+from scenewright.stages.plan.tray_loading import GRAVITY, easiest_first, lifts_left, lifts_left_beside, load_moments
 from scenewright.stages.plan.world_model import RobotState, WorldModel, as_held
 
 APPROACH = 0.10
@@ -34,7 +34,8 @@ FRICTION_USED = 0.3
 """Half of the friction **assumed** of rubber on household things: grasps that ask for no more are tried first, as what
 is held is carried with starts and stops."""
 LOW_LIFT, BACK_OUT = 0.012, (0.25, 0.15)
-"""How far a thing is lifted where there is no room for more, and how far it then goes back out [m]; by eye."""
+"""How far a thing is lifted where there is no room for more, and how far it then goes back out [m]; by eye. Under a
+cover that is nearer still it slides out."""
 STEEP = 1.2
 """A hand that came so steeply goes back up, not out [rad]."""
 PALM_BEHIND, HAND_END = 0.04, 0.11
@@ -217,8 +218,16 @@ def plan_pick(
         for grasp in (*grasps, *others)
     }
     sideways = style == "rather_level"
-    # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge.
-    queue.sort(key=lambda entry: (not over[id(entry[1])], sideways and entry[1].pitch > max(PITCHES["level"])))
+    twist = {} if model.laden(item) else {id(grasp): _twist(model, item, grasp) for grasp in (*grasps, *others)}
+    # A hand that reaches below the item's foot, over an edge, cannot put it down but over an edge; what turns it in the
+    # fingers most is tried last.
+    queue.sort(
+        key=lambda entry: (
+            not over[id(entry[1])],
+            sideways and entry[1].pitch > max(PITCHES["level"]),
+            twist.get(id(entry[1]), 0.0),
+        )
+    )
     if preferred is not None:
         queue.insert(0, (preferred[0], Grasp(preferred[1], 0.0, 0.0)))
     attempts = (_try_pick(model, state, item, source, at, grasp, arm_planner, tally) for at, grasp in queue)
@@ -227,6 +236,14 @@ def plan_pick(
         return motion
     tally.raise_for(f"pick({item}, {source})", (item, source))
     raise AssertionError("unreachable")
+
+
+def _twist(model: WorldModel, item: str, grasp: Grasp) -> float:
+    """Return the most that a thing's weight turns it about the line between the fingers, in tenths [N m]: pads resist
+    that by friction alone, however the hand is turned on its way."""
+    tool_from_middle = inverse(model.pose(item) @ grasp.body_from_tool) @ model.world.center_of_mass(item)
+    lever = float(np.hypot(tool_from_middle[0, 3], tool_from_middle[2, 3]))
+    return round(GRAVITY * model.records[item].mass * lever, 1)
 
 
 def _first_motion(attempts: Iterator[Manipulation | MotionFailed | None], searches: int) -> Manipulation | None:
@@ -277,9 +294,12 @@ def _try_pick(
         arm_planner.under(carrying(item, tool_from_item, model.links(item), depths))
         for depths in (allowed_depths, within, {})
     )
-    lifted = _lifted(model, base, arm, world_from_tool, grasp.pitch > STEEP, off, out, tally)
+    lifts = (RAISE,) if laden else _lifts(model, item, source)
+    lifted = _lifted(model, base, arm, world_from_tool, lifts, grasp.pitch > STEEP, off, out, tally)
     if lifted is None:
         return None
+    if not laden and not in_hand.free(base, lifted[-1], tally):
+        return None  # slid out, it stands on its support still
     folded = lifted[-1] if laden else in_hand.folded(base, lifted[-1], tally)
     if folded is None:
         return None
@@ -312,16 +332,18 @@ def _lifted(
     base: np.ndarray,
     arm: np.ndarray,
     world_from_tool: np.ndarray,
+    lifts: tuple[float, ...],
     steep: bool,
     off: ArmPlanner,
     out: ArmPlanner,
     tally: Tally,
 ) -> np.ndarray | None:
-    """Return arm values (K, J) up `off` what a thing in the hand stands on, and `out` the way the hand came, or further
-    up where it came `steep`; a laden one is drawn in level. None where nothing is free."""
+    """Return arm values (K, J) by the first of the `lifts` [m] that serves up `off` what a thing in the hand stands on,
+    and `out` the way the hand came, or further up where it came `steep`; a laden one is drawn in level. None where
+    nothing is free."""
     item = out.checker.query.carried
     laden = item is not None and model.laden(item)
-    for lift in (RAISE,) if laden else (LIFT, LOW_LIFT):
+    for lift in lifts:
         goal = _shifted_pose(world_from_tool, np.array([0.0, 0.0, lift]))
         up = off.line(base, arm, goal, tally)
         if up is None:
@@ -335,6 +357,19 @@ def _lifted(
             if back is not None:
                 return np.concatenate([up, back[1:]])
     return None
+
+
+def _lifts(model: WorldModel, item: str, source: str) -> tuple[float, ...]:
+    """Return how far a thing may be lifted off what it stands on [m], the farthest first. A cover may be part of the
+    link on which it stands, which it touches anyway: how near that is, is asked of the region."""
+    region = model.region_under(item, source) if source in model.records else None
+    room = np.inf
+    if region is not None and region.covered:
+        points = apply(inverse(model.world_from_region(region)) @ model.pose(item), model.points(item))
+        low, high = points.min(axis=0), points.max(axis=0)
+        radius = float((high - low)[:2].max()) / 2
+        room = region.free_height((low + high)[:2] / 2, radius) - (high[2] - low[2]) - model.checker.clearance
+    return (*(lift for lift in (LIFT, LOW_LIFT) if lift < room), 0.0)
 
 
 def _opened_configuration(state: RobotState, opening: float) -> Configuration:
@@ -367,7 +402,8 @@ def plan_place(
     """
     assert state.tool_from_item is not None
     on_tray = model.records[target].carriable
-    places = sample_placements(model, item, target, door, random, 4 * PLACES if on_tray else PLACES)
+    drawn = sample_placements(model, item, target, door, random, 4 * PLACES if on_tray else PLACES)
+    places = untaken(model, item, target, drawn) or drawn  # what takes them up is told by the attempts
     if not places and preferred is None:
         regions = place_regions(model, item, target, door)
         raise MotionFailed(

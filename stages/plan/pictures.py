@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import trimesh
 from scenewright.schemas.interactive_scene import SceneBody
@@ -12,7 +10,7 @@ from scenewright.stages.kit.geometry.transforms import apply, look_at
 from scenewright.stages.kit.motion.recording import Snapshot, moving_links
 from scenewright.stages.kit.rendering.light_map import AreaLight
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
-from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup
+from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup, joined_soups, moved_soup
 from scenewright.stages.kit.simulation.robot_description import PEDESTAL_LINK, RobotDescription, mobile_robot_urdf
 from scenewright.stages.kit.simulation.shapes import has_colors, link_shapes, paint
 from scenewright.stages.kit.simulation.world import PhysicsWorld
@@ -21,22 +19,6 @@ HAND, FINGER, PEDESTAL, ARM = (70, 72, 78), (40, 42, 46), (58, 66, 84), (236, 23
 """Colours of the robot."""
 PALETTE = ((166, 143, 120), (139, 158, 171), (171, 139, 139), (146, 164, 136), (181, 166, 127), (150, 141, 168))
 """Colours (sRGB) of furniture that has none of its own, in turn; by eye."""
-
-
-def _moved_soup(soup: TriangleSoup, pose: np.ndarray) -> TriangleSoup:
-    turn = pose[:3, :3].T.astype(np.float32)
-    return replace(
-        soup,
-        corners=soup.corners @ turn + pose[:3, 3].astype(np.float32),
-        face_normals=soup.face_normals @ turn,
-        corner_normals=soup.corner_normals @ turn,
-    )
-
-
-def _join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
-    names = ("corners", "face_normals", "corner_normals", "corner_colors", "instance", "material")
-    columns = {name: np.concatenate([getattr(soup, name) for soup in soups]) for name in names}
-    return TriangleSoup(**columns, material_table=soups[0].material_table)
 
 
 def _painted_mesh(mesh: trimesh.Trimesh, color: tuple[int, int, int]) -> trimesh.Trimesh:
@@ -69,7 +51,7 @@ class RoomPictures:
                 if record.movable or link in joint_links:
                     self._moving[link] = soup
                     continue
-                placed = _moved_soup(soup, world.link_pose(name, link))
+                placed = moved_soup(soup, world.link_pose(name, link))
                 if record.class_name == "wall":
                     self._shell.append(placed)
                 elif record.class_name != "ceiling":
@@ -86,24 +68,24 @@ class RoomPictures:
 
     def _renderer(self, snapshot: Snapshot, shell: bool) -> SceneRenderer:
         moving = [
-            _moved_soup(soup, snapshot.links[link]) for link, soup in self._moving.items() if link in snapshot.links
+            moved_soup(soup, snapshot.links[link]) for link, soup in self._moving.items() if link in snapshot.links
         ]
         if not shell:
-            return SceneRenderer(_join_soups([*self._still, *moving]), antialias=False)
+            return SceneRenderer(joined_soups([*self._still, *moving]), antialias=False)
         x, y = (self.low + self.high)[:2] / 2
         lights = (
             AreaLight((x + 0.8, y - 0.6, 9.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.62, 0.60, 0.57)),
             AreaLight((x - 0.9, y + 0.9, 8.0), (0.5, 0.0, 0.0), (0.0, -0.5, 0.0), (0.18, 0.19, 0.21)),
         )
         return SceneRenderer(
-            _join_soups([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49)
+            joined_soups([*self._still, *self._shell, *moving]), lights=lights, ambient=(0.46, 0.47, 0.49)
         )
 
     def sight(self, world: PhysicsWorld) -> SceneRenderer:
         """Return what cameras in the room see now, the robot aside."""
         links = moving_links(world)
-        moving = [_moved_soup(soup, links[link]) for link, soup in self._moving.items() if link in links]
-        return SceneRenderer(_join_soups([*self._still, *self._shell, *moving]), shadows=False, antialias=False)
+        moving = [moved_soup(soup, links[link]) for link, soup in self._moving.items() if link in links]
+        return SceneRenderer(joined_soups([*self._still, *self._shell, *moving]), shadows=False, antialias=False)
 
     def overview(self, snapshot: Snapshot, camera: Camera) -> np.ndarray:
         """Return (H, W, 3) uint8: the whole room from above and aside, without walls and ceiling."""

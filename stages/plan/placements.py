@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,8 @@ PUT_DOWN_HEIGHT = 0.006
 """Items are let go this far over the surface [m]."""
 PLACES = 48
 """Drawn in each region."""
+TURNS = 8
+"""Yaws of a thing that are tried at a place."""
 EDGE = 0.8
 """Surface is wanted under a circle of this share of the item's radius, and under its middle."""
 COMFORT = 0.9
@@ -49,8 +51,7 @@ def sample_placements(
     """Return up to `count` placements a region, those of regions at a comfortable height first, taking turns; tight
     ones come last.
 
-    A place counts where the region has surface under the foot and room above it. Whether it is taken shows when the
-    item is put there in the collision checker.
+    A place counts where the region has surface under the foot and room above it, taken or not (`untaken`).
     """
     radius, height = model.footprint(item)
     bottom = model.foot(item)
@@ -74,6 +75,21 @@ def sample_placements(
     longest = max((len(places) for places in turns), default=0)
     mixed = [places[turn] for turn in range(longest) for places in turns if turn < len(places)]
     return sorted(mixed, key=lambda place: not place.roomy)
+
+
+def untaken(model: WorldModel, item: str, target: str, places: list[Placement]) -> list[Placement]:
+    """Return the places on which an item does not meet anything but `target`, turned about the vertical one way or
+    another; the yaw of the first way that is free is theirs."""
+    links, free = set(model.links(target)), []
+    for place in places:
+        for turn in 2 * np.pi * np.arange(TURNS) / TURNS:
+            pose = place.world_from_item @ transform_from_yaw(turn, np.zeros(3))
+            with model.world.posed(item, pose @ model.standing(item)):
+                taken = set(model.checker.overlaps(item)) - links
+            if not taken:
+                free.append(replace(place, world_from_item=pose))
+                break
+    return free
 
 
 def _height(model: WorldModel, region: Region) -> float:

@@ -72,6 +72,14 @@ class Region:
         inside = np.all((cells >= 0) & (cells < self.free.shape), axis=1)
         return bool(inside.all() and (self.free[cells[:, 0], cells[:, 1]] > height).all())
 
+    def free_height(self, spot: np.ndarray, radius: float) -> float:
+        """Return the least free height [m] over the middle and the rim of a round foot at `spot` (2,), where there is
+        surface under them; `OPEN_AIR` where there is none."""
+        cells = np.floor((np.concatenate([spot[None], spot + radius * CIRCLE]) - self.low) / CELL).astype(int)
+        cells = cells[np.all((cells >= 0) & (cells < self.free.shape), axis=1)]
+        free = self.free[cells[:, 0], cells[:, 1]]
+        return float(free[free > 0].min(initial=OPEN_AIR))
+
     @property
     def covered(self) -> bool:
         """Whether hands come from the side: something is above that does not go away."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -11,9 +12,11 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.interactive_scene import InteractiveScene, SceneBody
 from scenewright.schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
+from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors, segmenter_rates
+from scenewright.stages.kit.acting.eyes.masks import Segmenter
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
-from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from scenewright.stages.kit.stage import Context
@@ -25,7 +28,7 @@ from scenewright.stages.plan.conduct import Conduct, joint_pairs
 from scenewright.stages.plan.correspondence import match_bodies
 from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.execution_log import write_execution
-from scenewright.stages.plan.eyes import Eyes, NoisyEyes, Room, TrueEyes
+from scenewright.stages.plan.eyes import Eyes, Room, TrueEyes
 from scenewright.stages.plan.goal_checks import check_goal
 from scenewright.stages.plan.parameters import PlanParameters
 from scenewright.stages.plan.pick_place import Budgets
@@ -33,6 +36,7 @@ from scenewright.stages.plan.pictures import RoomPictures, picture_camera
 from scenewright.stages.plan.reading import Reading
 from scenewright.stages.plan.refinement import Step
 from scenewright.stages.plan.replanning import Replanning, Search
+from scenewright.stages.plan.room_segmenter import room_segmenter
 from scenewright.stages.plan.trajectories import executed_rows
 from scenewright.stages.plan.tree_state import after_step, graph_of_state, observed_state, start_state, tree_differences
 from scenewright.stages.plan.world_model import RobotState, WorldModel, body_planes
@@ -138,7 +142,7 @@ def execute(
     replanning = Replanning(model, order.graph, believed, order.literals, order.reading, search)
     observed: dict[int, TreeState] = {}
     anew: dict[int, TreeState] = {}
-    with load_scene(root) as world:
+    with load_scene(root) as world, ExitStack() as stack:
         world.anchor_friction()
         start = Configuration(order.state.base, order.state.arm, model.description.opening)
         physical = _robot(world, model, start, parameters, context)
@@ -178,7 +182,7 @@ def execute(
             parameters.relocalize,
             parameters.execution_attempts,
             observe=observe,
-            eyes=_eyes(Sight(model, room, physical, joint_names, pictures), parameters, context),
+            eyes=_eyes(Sight(model, room, physical, joint_names, pictures), parameters, context, stack),
         )
         if failures:
             conduct.steps = order.steps
@@ -245,17 +249,27 @@ class Sight:
     pictures: RoomPictures
 
 
-def _eyes(sight: Sight, parameters: PlanParameters, context: Context) -> Eyes:
+def _eyes(sight: Sight, parameters: PlanParameters, context: Context, stack: ExitStack) -> Eyes:
     model, physical = sight.model, sight.physical
     true = TrueEyes(model, sight.room, physical, sight.joint_names)
     if not isinstance(physical, ErringRobot):
         return true
-    classes = tuple(sorted({record.class_name for record in model.records.values() if record.carriable}))
-    errors = SegmenterErrors(SegmenterRates(), Luck(context.seed), classes)
-    if parameters.eyes == "noisy":
-        return NoisyEyes(true, physical, errors)
     noise = context.random(CAMERA_NOISE)
-    return CameraEyes(model, sight.room, sight.pictures, physical, errors, noise, parameters.match_radius)
+    segmenter = _segmenter(sight, parameters, context, stack)
+    return CameraEyes(model, sight.pictures, physical, segmenter, noise, parameters.match_radius)
+
+
+def _segmenter(sight: Sight, parameters: PlanParameters, context: Context, stack: ExitStack) -> Segmenter:
+    if parameters.segmenter:
+        from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter
+
+        known = [entry.name for entry in load_vocabulary().classes]
+        asked = AskedSegmenter(parameters.segmenter, context.seed, known)
+        stack.callback(asked.close)
+        return asked
+    sought = sorted({record.class_name for record in sight.model.records.values() if record.carriable})
+    errors = SegmenterErrors(segmenter_rates(parameters.segmenter_errors), Luck(context.seed), sought)
+    return room_segmenter(sight.room, sight.physical.world, errors)
 
 
 def _read_room(root: Path, order: Order) -> Room:

@@ -6,10 +6,10 @@ import numpy as np
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from scenewright.schemas.plan import BodyMatch, TreeDifference
 from scenewright.stages.kit.motion.doors import is_closed, is_open
+from scenewright.stages.kit.simulation.carriers import HAND, NOTHING, carrier
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 from scenewright.stages.plan.action import action_named
 from scenewright.stages.plan.believed_tree import TreeState
-from scenewright.stages.plan.carriers import HAND, NOTHING, carrier
 from scenewright.stages.plan.refinement import Step
 from scenewright.stages.plan.updated_graph import update_graph
 from scenewright.stages.plan.world_model import WorldModel

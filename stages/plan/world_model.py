@@ -12,12 +12,10 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.interactive_scene import SceneBody
 from scenewright.schemas.scene_parts import Joint, SurfacePlane
+from scenewright.stages.kit.acting.belief import BelievedRoom
 from scenewright.stages.kit.acting.query import NOTHING, CollisionQuery, carrying
 from scenewright.stages.kit.geometry.transforms import apply, inverse, quaternion_of, transform_from_quaternion
-from scenewright.stages.kit.motion.collision import CollisionChecker
 from scenewright.stages.kit.motion.doors import body_from_moved
-from scenewright.stages.kit.motion.kinematics import ArmChain, arm_chain
-from scenewright.stages.kit.simulation.robot import Configuration, Robot
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.shapes import joined, link_shapes, surface_points
 from scenewright.stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
@@ -53,35 +51,26 @@ class Snapshot:
     """Carriers that were one body with their load."""
 
 
-class WorldModel:
+class WorldModel(BelievedRoom):
     """The scene as the robot believes it, with a robot in it. Nothing moves by physics here."""
 
     def __init__(self, root: Path, graph: ContactGraphFile, description: RobotDescription, clearance: float) -> None:
-        self.description = description
-        self.chain: ArmChain = arm_chain(description)
-        self.world = PhysicsWorld()
+        bodies = read_scene_bodies(root)
+        super().__init__(description, clearance, bodies.values())
         self.records: dict[str, SceneBody] = {}
         self._texts: dict[str, str] = {}
         self.planes: dict[str, tuple[SurfacePlane, ...]] = {}
         nodes = {node.id: node for node in graph.nodes}
-        for name, (record, text) in read_scene_bodies(root).items():
+        for name, (record, text) in bodies.items():
             self.records[name], self._texts[name] = record, text
             self.planes[name] = nodes[name].planes if name in nodes else ()
             if not any(plane.horizontal and len(plane.corners) == 4 for plane in self.planes[name]):
                 self.planes[name] += body_planes(record, text)
-            self.world.add_body(record, text)
-        self.robot = Robot(self.world, description)
-        self.checker = CollisionChecker(self.world, self.robot, clearance)
-        self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
         self.room = self._room()
         self._points: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._regions: dict[str, tuple[Region, ...]] = {}
         self._aboard: dict[str, tuple[str, np.ndarray]] = {}
         """What is lifted with a carrier: item -> (carrier, carrier_from_item)."""
-
-    def close(self) -> None:
-        """End the pybullet world."""
-        self.world.close()
 
     def _room(self) -> tuple[np.ndarray, np.ndarray]:
         floors = [name for name, record in self.records.items() if record.class_name == "floor"]
@@ -100,8 +89,7 @@ class WorldModel:
         self.records[name], self._texts[name], self.planes[name] = record, text, planes
         self._points.pop(name, None)
         self._regions.pop(name, None)
-        self.world.add_body(record, text)
-        self.checker.add_body(name)
+        self.add(record, text)
 
     def forget(self, name: str) -> None:
         """Take a body out of what is believed."""
@@ -180,8 +168,7 @@ class WorldModel:
         for item in (carrier, *load):
             self.world.remove_body(item)
         self._aboard |= aboard
-        self.world.add_body(moved_record(self.records[carrier], pose, {}), text)
-        self.checker.add_body(carrier)
+        self.add(moved_record(self.records[carrier], pose, {}), text)
 
     def laden(self, carrier: str) -> bool:
         """Whether something is lifted with a body."""
@@ -195,8 +182,7 @@ class WorldModel:
             self.world.remove_body(carrier)
         self._aboard = {}
         for item, pose in sorted(poses.items()):
-            self.world.add_body(moved_record(self.records[item], pose, {}), self._texts[item])
-            self.checker.add_body(item)
+            self.add(moved_record(self.records[item], pose, {}), self._texts[item])
 
     def snapshot(self) -> Snapshot:
         """Return where everything is, for `restore`."""

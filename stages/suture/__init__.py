@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from scenewright.stages.suture.needle.thesis import thesis_average, thesis_estimate
     from scenewright.stages.suture.options import ARM_NAMES
     from scenewright.stages.suture.rig import ENDOSCOPE, NEEDLE_RADIUS, TWO_CAMERAS, NeedlePose, StereoRig
+    from scenewright.stages.suture.robot.arms import REMOTE_CENTRES
+    from scenewright.stages.suture.robot.psm import YAW_TO_TIP
     from scenewright.stages.suture.segmentation.infer import Masks, Segmenter
     from scenewright.stages.suture.thread.reconstruct import ThreadCurve, reconstruct_thread
     from scenewright.stages.suture.training.network.views import CALIBRATION_ERROR, kept_view, read_eye
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from scenewright.stages.suture.trials.sight import PICTURED_FROM_TRIAL, Looked, LookingEyes
     from scenewright.stages.suture.trials.thesis.extraction import NoSweep
     from scenewright.stages.suture.trials.thesis.handover import NormalUnchanged
+    from scenewright.stages.suture.trials.wound import RIDGE_HALF_WIDTH, RIDGE_HEIGHT
     from scenewright.stages.suture.world.clutter import cluttered, false_masks
     from scenewright.stages.suture.world.corruption import noisy_disparity
     from scenewright.stages.suture.world.render import Eye, StereoView, render

@@ -11,9 +11,10 @@ import numpy as np
 from scenewright.stages.kit.simulation.margins import RUNS, margin, perturbed
 from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene, read_scene_bodies
 from scenewright.stages.urdf.joint_sweep import HIT_DEPTH, JointRange, sweep_joint
+from scenewright.stages.urdf.motions import WATCHED, BodyMotion, gone
 from scenewright.stages.urdf.resting import STILL
 from scenewright.stages.urdf.scene_penetration import Overlap, pair_depth
-from scenewright.stages.urdf.settle_report import COLLISION_DEPTH, WATCHED, BodyMotion, SettleReport, free_bodies, gone
+from scenewright.stages.urdf.settle_report import COLLISION_DEPTH, SettleReport, free_bodies
 
 REACH = 2.0
 """A move is near its limit when it is less than twice as large or small: only a spread of half of a move could make one
@@ -30,7 +31,7 @@ BESIDE = 0.05
 
 def with_margins(report: SettleReport, scene_folder: Path) -> SettleReport:
     """Return the report of a scene with the margins of what is near a threshold. Writes nothing. Raises BadInput."""
-    bodies = [body for body in report.bodies if _body_is_near(body)]
+    bodies = [body for body in report.bodies if body_is_near(body)]
     joints = [joint for joint in report.joints if _joint_is_near(joint)]
     pairs = [pair for pair in report.overlaps if abs(pair.depth - COLLISION_DEPTH) < DEPTH_REACH]
     if not (bodies or joints or pairs):
@@ -59,7 +60,7 @@ def _shares(body: BodyMotion) -> tuple[float, float]:
     )
 
 
-def _body_is_near(body: BodyMotion) -> bool:
+def body_is_near(body: BodyMotion) -> bool:
     """Whether what is said of a body could be otherwise: one limit is near, and none is passed by far."""
     shares = _shares(body)
     return not body.fell_through and max(shares) < REACH and max(shares) > 1.0 / REACH
@@ -126,7 +127,7 @@ def _body_margins(
             _let_rest(world, seconds)
             for name, motions in runs.items():
                 motions.append(gone(before[name], world.center_of_mass(name)))
-    return {body.name: _body_margin(body, runs[body.name]) for body in bodies}
+    return {body.name: body_margin(body, runs[body.name]) for body in bodies}
 
 
 def _let_rest(world: PhysicsWorld, seconds: float) -> None:
@@ -139,7 +140,8 @@ def _let_rest(world: PhysicsWorld, seconds: float) -> None:
             return
 
 
-def _body_margin(body: BodyMotion, runs: list[tuple[float, float]]) -> float:
+def body_margin(body: BodyMotion, runs: list[tuple[float, float]]) -> float:
+    """Return the margin of what is said of a body, of how far it moved [m] and turned [rad] in runs beside it."""
     margins = (
         margin(body.moved, body.moved_limit, [moved for moved, _ in runs]),
         margin(body.turned, body.turned_limit, [turned for _, turned in runs]),

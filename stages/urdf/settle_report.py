@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,49 +14,17 @@ from scenewright.stages.kit.simulation.engine import engine
 from scenewright.stages.kit.simulation.margins import is_marginal
 from scenewright.stages.kit.simulation.world import PhysicsWorld, load_scene
 from scenewright.stages.urdf.joint_sweep import JointRange, sweep_joints
+from scenewright.stages.urdf.motions import MOVED_LIMIT, TURNED_LIMIT, WATCHED, BodyMotion, gone, motion_of, watched
 from scenewright.stages.urdf.scene_penetration import Overlap, resting_overlaps
-from scipy.spatial.transform import Rotation
 
 Verdict = Literal["ok", "unsettled", "penetrating", "nothing_movable"]
 """Outcome of a scene that was let go."""
 SECONDS = 3.0
 """Simulated time that a scene is given to come to rest [s]."""
-MOVED_LIMIT = 0.01
-"""A movable body that moves further has not stayed [m]."""
-TURNED_LIMIT = np.radians(2.0)
-"""A movable body that turns further has not stayed [rad]."""
-WATCHED = 0.05
-"""How often is looked at what was let go [s]."""
 SEEN_MOVE = 1e-3
 """A body that never goes further is shown standing still [m]."""
 COLLISION_DEPTH = 0.005
 """Two bodies collide when they lie deeper than this in each other at rest [m]."""
-
-
-@dataclass(frozen=True)
-class BodyMotion:
-    """What became of one movable body."""
-
-    name: str
-    moved: float
-    """Distance between where its centre of mass was and where it is [m]."""
-    turned: float
-    """Angle between how it stood and how it stands [rad]."""
-    fell_through: bool
-    """Whether all of it ended below the top of the floor (without a floor: below everything that is fixed)."""
-    moved_limit: float = MOVED_LIMIT
-    turned_limit: float = TURNED_LIMIT
-    leaves: float | None = None
-    """When it first was beyond a limit, as far as it was looked at [s]."""
-    margin: float | None = None
-    """How far it is from what decides whether it stays (`settle_margins`); None: far."""
-    poses: tuple[np.ndarray, ...] = field(default=(), compare=False, repr=False)
-    """(4, 4) of its frame in the world, every WATCHED seconds from the start on."""
-
-    @property
-    def stays(self) -> bool:
-        """Whether it stayed where it was, within the limits."""
-        return self.moved <= self.moved_limit and self.turned <= self.turned_limit and not self.fell_through
 
 
 @dataclass(frozen=True)
@@ -184,8 +152,9 @@ def _margin_of_all(entries: list[tuple[bool, float | None]]) -> float | None:
 
 
 def _plain(body: BodyMotion) -> dict[str, Any]:
-    values = asdict(replace(body, poses=()))
-    del values["poses"], values["leaves"]
+    values = asdict(replace(body, poses=(), times=(), centers=()))
+    for unsaid in ("poses", "times", "centers", "leaves"):
+        del values[unsaid]
     return values | {"stays": body.stays}
 
 
@@ -227,41 +196,26 @@ def free_bodies(world: PhysicsWorld) -> list[str]:
 def _let_go(world: PhysicsWorld, seconds: float, moved_limit: float, turned_limit: float) -> list[BodyMotion]:
     ground = _ground(world)
     movable = free_bodies(world)
-    before = {name: world.center_of_mass(name) for name in movable}
-    left: dict[str, float] = {}
-    seen = {name: [world.pose(name)] for name in movable}
-    steps = round(seconds / world.time_step)
-    every = max(1, round(WATCHED / world.time_step))
-    for done in range(0, steps, every):
-        count = min(every, steps - done)
-        world.step(count)
+    frames: dict[str, list[np.ndarray]] = {name: [] for name in movable}
+
+    def look() -> dict[str, np.ndarray]:
         for name in movable:
-            moved, turned = gone(before[name], world.center_of_mass(name))
-            seen[name].append(world.pose(name))
-            if moved > moved_limit or turned > turned_limit:
-                left.setdefault(name, (done + count) * world.time_step)
-    motions = []
-    for name in movable:
-        moved, turned = gone(before[name], world.center_of_mass(name))
-        motions.append(
-            BodyMotion(
-                name,
-                moved,
-                turned,
-                fell_through=bool(world.bounds(name)[1][2] < ground),
-                moved_limit=moved_limit,
-                turned_limit=turned_limit,
-                leaves=left.get(name),
-                poses=tuple(seen[name]),
-            )
+            frames[name].append(world.pose(name))
+        return {name: world.center_of_mass(name) for name in movable}
+
+    times, looks = watched(world.step, look, seconds, world.time_step)
+    return [
+        motion_of(
+            name,
+            times,
+            [seen[name] for seen in looks],
+            fell_through=bool(world.bounds(name)[1][2] < ground),
+            moved_limit=moved_limit,
+            turned_limit=turned_limit,
+            poses=tuple(frames[name]),
         )
-    return motions
-
-
-def gone(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
-    """Return how far [m] and by how much [rad] a pose (4, 4) is another one."""
-    turned = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).magnitude()
-    return float(np.linalg.norm(after[:3, 3] - before[:3, 3])), float(turned)
+        for name in movable
+    ]
 
 
 def settle_file(report: SettleReport) -> SettleFile:

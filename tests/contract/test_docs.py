@@ -61,7 +61,8 @@ def options() -> dict[str, set[str]]:
 
     found = walk(inspect.getclosurevars(build_application()).nonlocals["table"], ())
     below_steps = {
-        words: found[words.replace(" ", "-")] for words in ("urdf check", "urdf settle", "export scene", "export plan")
+        words: found[words.replace(" ", "-")]
+        for words in ("urdf check", "urdf settle", "urdf protocol", "export scene", "export plan")
     }
     return found | below_steps | dict.fromkeys(EXAMPLES, {"--panoptic-map", "--out"})
 

@@ -1,16 +1,20 @@
-"""Tasks of the board: drawn from the true room, given to a reconstructed scene, carried out and judged in the true one.
+"""Tasks of the board: drawn from the true room, given to a reconstructed scene or to the true room itself, carried out
+and judged in the true one.
 
 A map that lacks a thing fails the literals that name it; what is left is planned, so that its share is measured.
 """
 
 from __future__ import annotations
 
+import shutil
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.plan import PlanFile
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.evaluate import load_truth
@@ -20,7 +24,7 @@ from benchmarks.board.tasks.carrying import OPTIONS, Carried, Counterparts, carr
 from benchmarks.board.tasks.drawing import Task, draw_tasks
 from benchmarks.board.tasks.room_facts import RoomFacts, room_facts
 from benchmarks.board.tasks.true_end import Ending, read_ending, which_hold
-from benchmarks.steps import opened
+from benchmarks.steps import opened, unrecorded
 
 EYES = ("camera", "true")
 """What the robot sees by; with `true` it is told how things stand before it acts."""
@@ -103,6 +107,15 @@ def run_tasks(method: Method, room: TaskRoom, made: MadeScene | None, scratch: P
         yield _record(room, number, task, eyes, carried, found, has_scene=known is not None)
 
 
+def run_true_room(room: TaskRoom, scratch: Path, eyes: str) -> Iterator[TaskRecord]:
+    """Yield what came of each task of a room, by some eyes, where the planned scene is the true room: a perfect map.
+    Plans are written to folders of `scratch`, by this checkout. Raises BadInput for a truth that can't be read."""
+    for number, task in enumerate(draw_tasks(facts_of(room.truth), room.seed)):
+        carried = Carried(task.literals(), ())
+        found = _planned_truth(room, carried.literals, scratch / f"{number}_{eyes}", eyes)
+        yield _record(room, number, task, eyes, carried, found, has_scene=True)
+
+
 def _counterparts(room: TaskRoom, made: MadeScene) -> Counterparts:
     pose = np.array(opened(Sequence, made.sequence).info.gravity.world_from_log)
     truth = load_truth(opened(GroundTruth, room.truth), pose, OPTIONS.minimum_visible_points)
@@ -133,6 +146,19 @@ def _planned(
         seconds = method.run("plan", out, *given, *CHEAP, "--seed", room.seed)
     except MethodFailed as failed:
         return _Found("refused", f"exit_{failed.exit_code}", 0, 0.0, Ending())
+    return _read_plan(out, seconds)
+
+
+def _planned_truth(room: TaskRoom, literals: tuple[str, ...], out: Path, eyes: str) -> _Found:
+    shutil.rmtree(out, ignore_errors=True)
+    truth, start = opened(GroundTruth, room.truth), time.process_time()
+    scene = InteractiveScene(truth.path("room"))
+    given = {"goal": literals, "eyes": eyes, "video_rate": 0, "image_width": 64}
+    unrecorded("plan", out, given, seed=room.seed, scene=scene, ground_truth=truth)
+    return _read_plan(out, round(time.process_time() - start, 2))
+
+
+def _read_plan(out: Path, seconds: float) -> _Found:
     plan = PlanFile.read(out / "plan.json")
     failure = plan.failures[-1].kind if plan.failures and plan.status != "executed" else ""
     log = out / "execution.mcap"

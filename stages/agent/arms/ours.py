@@ -21,7 +21,7 @@ from scenewright.stages.agent.body import Body
 from scenewright.stages.agent.exploration import explore
 from scenewright.stages.agent.goals import CARRIERS
 from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
-from scenewright.stages.agent.scene_map import Item, Region, classes_not_of, quarter
+from scenewright.stages.agent.scene_map import ENOUGH, Item, Region, classes_not_of, quarter
 from scenewright.stages.agent.senses import Base, Detection, Position
 
 SURE_OF_USE = 2
@@ -52,6 +52,8 @@ LITTLE = 0.1
 """No look is taken that shows less of where it may lie."""
 PULLS = 3
 """Most pulls at one door within one call: where it does not move from there, the rest is not the base pose. By eye."""
+TALL = 1.2
+"""No arm gets over furniture of this height [m]: it is opened from anywhere before it. By eye."""
 DEEPER = (0.0, 0.07, 0.14)
 """Extra distances at which a base with a short arm stands before what is open [m], too, and at more places; by eye."""
 ON_FLOOR = 0.2
@@ -188,7 +190,7 @@ class OwnSkills(CommonSkills):
         model all others tell equally much, so that the next is the cheapest from where it was not seen yet: from near
         by wherever the arm gets there, else from another side."""
         for _ in range(MOST_VIEWS):
-            if item.margin >= self._body.enough or item.key not in self.scene.items:
+            if item.margin >= ENOUGH or item.key not in self.scene.items:
                 return
             viewpoint = self._near_by(item)
             if viewpoint is not None and self._there(viewpoint, item.place):
@@ -491,6 +493,8 @@ class OwnSkills(CommonSkills):
         """Try the positions, each from base poses that reach it."""
         tries = 0
         last: Failure | None = None
+        if not at:
+            return Outcome(False, "unreachable", f"{place} has no free spot that is known")
         for position in at:
             for base in self._stations(place, position):
                 if tries >= (TRIES if self._use.repair else 1):
@@ -555,7 +559,9 @@ class OwnSkills(CommonSkills):
         at = (*piece.centre, piece.height)
         tries = 0
         last: Failure | None = None
-        for base in self._stations(key, at):
+        over = piece.height < TALL and not piece.top  # else nothing says where the arm has to get to
+        bases = self._stations(key, at) if over else (base for _, base in self._before(key))
+        for base in bases:
             if tries == (PULLS if self._use.repair else 1):
                 break
             tries += 1
@@ -564,7 +570,7 @@ class OwnSkills(CommonSkills):
             felt = self._body.pull(at, opening=opening)
             if felt.ok:
                 self.scene.set_opened(key, opening, felt.furniture)
-                return Outcome(True)
+                return Outcome(True, numbers={"more": 1.0} if self.scene.furniture[key].more else {})
             last = felt.failure
             self._remember_failure(key, base, at)
         return self._unreachable(key, tries, last)

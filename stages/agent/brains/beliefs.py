@@ -75,6 +75,8 @@ class Note:
     """A picture of it was looked at."""
     doubted: str | None = None
     """What it looked like in the hand, where that was something else."""
+    several: bool = False
+    """It has several doors or drawers."""
     disputed: str | None = None
     """What it looks like from some sides, where that is not what is sought."""
 

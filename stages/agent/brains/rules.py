@@ -197,6 +197,8 @@ class RulesBrain:
         target = beliefs.carrier(onto)
         if target is None:
             return self._no_way(onto) if onto.labels[0] in FURNITURE else self._search(onto, [])
+        if target.top and goal.inside:
+            return _end("give_up", f"I put things on the {target.label}, not into it")
         if among and self._style.skilled and beliefs.held is None and len(beliefs.fitting(onto)) < SEVERAL:
             return _end("give_up", f"one {onto.text} is all that was surely seen: it has no middle")
         return self._deliver(thing, what, target, how)
@@ -209,7 +211,8 @@ class RulesBrain:
             return self._call("Is it what it looks like?", "report_observation", thing)
         source, place = "" if holding else thing.place, target.place or target.key
         doors = frozenset(key for key, item in beliefs.rooms.items() if item.door)
-        shut = frozenset(key for key in doors if not beliefs.rooms[key].opened)
+        on_top = {key for key, item in ((source, thing), (place, target)) if item.top}
+        shut = frozenset(key for key in doors - on_top if not beliefs.rooms[key].opened)
         steps = steps_to(beliefs.at, source, place, shut, doors)
         if skilled:
             steps = tuple(step for step in steps if step.name != "navigate") or steps
@@ -285,10 +288,13 @@ class RulesBrain:
             note.looked += self._style.rounds
             return self._next()  # there is one place less to look at
         item = beliefs.rooms.get(place)
-        again = note.looked > 0 and self._style.skilled and beliefs.asked != ("navigate", place)
+        just_opened = beliefs.asked == ("open", place) and (note.several or (item is not None and item.top))
+        again = note.looked > 0 and self._style.skilled and beliefs.asked != ("navigate", place) and not just_opened
         if item is not None and (beliefs.at != place or again):
             return self._step(Step("navigate", place))
-        if item is not None and item.door and not item.opened:
+        on_top = item is not None and item.top and not note.looked
+        next_door = item is not None and item.more and beliefs.asked != ("open", place)
+        if item is not None and item.door and (not item.opened or next_door) and not on_top:
             return self._step(Step("open", place))
         return self._look("What is here?")
 

@@ -52,7 +52,8 @@ def _mapped(beliefs: Beliefs, found: ObjectMap) -> None:
         note.classes.add(item.label)
         note.written = f"{beliefs.map_name(place)}[{item.key!r}]"
         beliefs.things[item.key] = item
-    beliefs.notes[place].looked += 1
+    if place not in beliefs.rooms or not beliefs.rooms[place].more:  # it is not looked at before all doors were open
+        beliefs.notes[place].looked += 1
     beliefs.demand(Duty.LOOK_AGAIN, False)
 
 
@@ -67,7 +68,9 @@ def _drove(beliefs: Beliefs, outcome: Outcome) -> None:
 def _turned(beliefs: Beliefs, outcome: Outcome, *, opened: bool) -> None:
     key = beliefs.asked.key
     if outcome.ok:
-        beliefs.rooms[key] = replace(beliefs.rooms[key], opened=opened)
+        more = bool(outcome.numbers.get("more"))
+        beliefs.rooms[key] = replace(beliefs.rooms[key], opened=opened, more=more)
+        beliefs.notes[key].several |= more
         beliefs.at = key
     else:
         beliefs.trouble("door", key)

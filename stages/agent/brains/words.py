@@ -23,14 +23,15 @@ COLORS = ("red", "blue", "green", "white", "yellow", "black")
 CLAUSES = re.compile(r"[.;!?]|,? and then |,? then |,? and (?=\w+ing )?")
 MOVE = re.compile(
     r"(?:(?:put|place|move|bring|take|get|carry|transfer)\s+)?(?P<what>.+?)\s+"
-    r"(?:(?:out of|from|on|off)\s+(?:the\s+|all\s+)*(?P<start>\w+)\s+)??"
-    r"(?:onto|on|to|into|in|inside)\s+(?P<onto>(?:the|a|an|my)\s+.+|\w+)"
+    r"(?:(?:out of|from|on|off)\s+(?:the\s+|all\s+)*(?P<start>\w+(?: \w+)??)\s+)??"
+    r"(?P<how>onto|on|to|into|in|inside)\s+(?P<onto>(?:the|a|an|my)\s+.+|\w+)"
 )
-TAKE_OUT = re.compile(r"(?:take|get)\s+(?P<what>.+?)\s+(?:out of|from)\s+(?:the\s+)?(?P<start>\w+)")
+TAKE_OUT = re.compile(r"(?:take|get)\s+(?P<what>.+?)\s+(?:out of|from)\s+(?:the\s+)?(?P<start>\w+(?: \w+)?)")
 AMONG = re.compile(r"(?:put|place)\s+(?P<what>.+?)\s+in(?:to)? the middle of\s+(?P<around>.+)")
 GATHER = re.compile(r"(?:put|place|gather)\s+(?P<what>.+?)\s+(?:onto|on) the same\s+(?P<onto>\w+)")
-SHUT = re.compile(r"(?P<how>close|shut|open)\s+(?:the\s+)?(?P<what>\w+)(?: again)?")
+SHUT = re.compile(r"(?P<how>close|shut|open)\s+(?:the\s+)?(?P<what>\w+(?: \w+)??)(?: again)?")
 TIDY = re.compile(r"\b(?:tidy|clean|clear)(?:ing)? (?:up )?(?:the |my )?(?:table|desk)")
+ARTICLES = ("the", "a", "an", "my")
 LITERAL = re.compile(r"(?P<name>on|in|closed|open)\(\s*(?P<first>[\w ]+?)\s*(?:,\s*(?P<second>[\w ]+?)\s*)?\)")
 TIDIED = tuple(Move(kind(word), kind(f"{word} box"), every=True) for word in CATEGORIES)
 
@@ -73,11 +74,11 @@ def _clause(clause: str, clean: bool, taken: Move | None) -> Goal:
     if found := SHUT.fullmatch(clause):
         return Shut(kind(_furniture(found["what"])), found["how"] == "open")
     if found := MOVE.fullmatch(clause):
-        onto = _carrier(found["onto"])
+        onto, inside = _carrier(found["onto"]), found["how"].startswith("in")
         if taken is not None and re.search(r"\bit\b", found["what"]):
-            return Move(taken.what, onto, taken.every, taken.start)
+            return Move(taken.what, onto, taken.every, taken.start, inside)
         what, every = _things(found["what"], clean)
-        return Move(what, onto, every, _furniture(found["start"]) if found["start"] else "")
+        return Move(what, onto, every, _furniture(found["start"]) if found["start"] else "", inside)
     raise NotUnderstood(f"I do not understand {clause[:80]!r}")
 
 
@@ -85,7 +86,7 @@ def _literal(found: re.Match[str]) -> Goal:
     first, second = found["first"], found["second"]
     if found["name"] in ("closed", "open"):
         return Shut(kind(_furniture(first)), found["name"] == "open")
-    return Move(_things(first, False)[0], _carrier(second or ""))
+    return Move(_things(first, False)[0], _carrier(second or ""), inside=found["name"] == "in")
 
 
 def _things(phrase: str, clean: bool) -> tuple[Description, bool]:
@@ -109,7 +110,10 @@ def _furniture(word: str) -> str:
 
 
 def _carrier(phrase: str) -> Description:
-    try:
-        return kind(_furniture(phrase.split()[-1] if phrase else ""))
-    except NotUnderstood:
-        return _things(phrase, False)[0]
+    words = [word for word in phrase.split() if word not in ARTICLES]
+    for count in (2, 1):  # a drawer unit, or a dining table
+        try:
+            return kind(_furniture(" ".join(words[-count:])))
+        except NotUnderstood:
+            continue
+    return _things(phrase, False)[0]

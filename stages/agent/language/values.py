@@ -21,6 +21,10 @@ class SceneObject:
     used: bool | None = None
     door: bool = False
     opened: bool = False
+    top: bool = False
+    """Of furniture with a door: things lie on its top as well. Of a thing: it lies on such a top."""
+    more: bool = False
+    """It has doors or drawers that were not opened yet."""
     on: str = ""
     """Key of the small carrier (plate, box) on which it lies."""
     doubt: str = ""

@@ -13,12 +13,16 @@ something that the cause hangs on has changed (another base, another grasp, the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
-from scenewright.stages.kit.rendering.segmenter_errors import GRASPS, SegmenterRates
+from scenewright.stages.kit.acting.errors import SegmenterRates, segmenter_rates
 
 EXECUTIONS = 262
 """Executions that table 3.4 counts."""
+GRASPS = 140 / 2 + 122 / 4
+"""Executions that grasp, as assumed above."""
+OTHERS_IN_VIEW = 5
+"""**Assumed**: things beside a sought one, each of which may be taken for it."""
 PLACES = 140 / 2 + 122 / 4
 """Executions that place, as assumed above."""
 DRIVES = 122 / 2
@@ -40,9 +44,26 @@ COUNTS = {"false_positive": 8, "missed": 2, "feedback": 3, "api": 8, "grasp": 24
 
 
 @dataclass(frozen=True)
-class Rates(SegmenterRates):
+class PrintedEyes:
+    """What table 3.4 says of the eyes, as rates of sights."""
+
+    missed: float = COUNTS["missed"] / GRASPS
+    wrong_name: float = COUNTS["false_positive"] / GRASPS / OTHERS_IN_VIEW
+    passed_both: float = 3 / 8
+    """Three of eight false detections passed the look from near by and led to failure."""
+
+    @property
+    def other_region(self) -> float:
+        """Correlation of two wrong names from two regions of views."""
+        return (self.passed_both - self.wrong_name) / (1 - self.wrong_name)
+
+
+@dataclass(frozen=True)
+class Rates:
     """Chances, each per draw. `base`, `slip` of a grasp; `shut`, `roll` of a place (no trajectory; rolls off)."""
 
+    eyes: SegmenterRates = field(default_factory=lambda: segmenter_rates("thesis"))
+    """Of what is missed or taken for something else."""
     feedback: float = COUNTS["feedback"] / CHECKS
     """That one view of an outcome is misjudged."""
     api: float = COUNTS["api"] / EXECUTIONS
@@ -62,8 +83,8 @@ class Rates(SegmenterRates):
             return {name: min(1.0, factor * getattr(self, name)) for name in names}
 
         acted = times(execution, "api", "base", "slip", "shut", "roll", "navigation")
-        return replace(self, **acted, **times(perception, "confusable", "hidden", "missed", "feedback"))
+        return replace(self, **acted, **times(perception, "feedback"), eyes=self.eyes.times(perception))
 
     def with_true_eyes(self) -> Rates:
         """Return the rates of the arm `oracle`: its eyes never err, and its reachability check tells everything."""
-        return replace(self, confusable=0.0, hidden=0.0, missed=0.0, feedback=0.0, foreseen=1.0)
+        return replace(self, eyes=self.eyes.times(0.0), feedback=0.0, foreseen=1.0)

@@ -15,7 +15,7 @@ from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Positio
 from scenewright.stages.agent.world.events import Event, EventLog
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.floor import Floor
-from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors
+from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors
 
 REACH, HIGHEST = 1.3, 1.4
 """Reach of the arm from the middle of the base over the ground, and the highest place that it reaches [m]."""
@@ -59,15 +59,12 @@ class FastWorld:
     """One episode's world. `sought`: classes that the eyes are prompted with; `floor`: if it is worked out already."""
 
     same_thing, stand_off, short_armed = 0.04, 0.45, False
-    enough = 3
-    """By the kit's error model one of five other things is taken for what is sought from three regions in 1 % of cases,
-    from two in 3 %; the hand's view comes on top."""
 
     def __init__(
         self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int, floor: Floor | None = None
     ) -> None:
         self.apartment, self._sought, self._rates, self._luck = apartment, sought, rates, Luck(seed)
-        self._errors = SegmenterErrors(rates, self._luck, sought)
+        self._errors = SegmenterErrors(rates.eyes, self._luck, sought)
         self.bodies = {thing.name: Body(thing, thing.on, thing.at) for thing in apartment.things}
         self.furniture = {piece.name: piece for piece in apartment.furniture}
         self.opened: set[str] = {piece.name for piece in apartment.furniture if piece.opened}
@@ -261,7 +258,7 @@ class FastWorld:
     def _detect(self, body: Body, sector: int, close: bool) -> Detection | None:
         name = body.thing.name
         region = (sector, close)
-        if self._errors.misses(name, body.moved, *region):
+        if self._errors.misses(name, (body.moved, region)):
             if body.thing.label in self._sought:
                 self._log.mistaken("missed", f"look {name}")
             return None
@@ -279,7 +276,7 @@ class FastWorld:
         )
 
     def _label(self, body: Body, *region: object) -> str:
-        return self._errors.class_of(body.thing.name, body.thing.label, *region)
+        return self._errors.name_of(body.thing.name, body.thing.label, (body.moved, region))
 
     def _other(self) -> str:
         return self._sought[0] if self._sought else "thing"

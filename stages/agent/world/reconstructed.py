@@ -8,11 +8,13 @@ on walls and what stands on furniture without being carriable is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.apartment import LARGEST_SIDE, Apartment, Furniture, Room, Thing
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.interactive_scene import SceneBody
+from scenewright.schemas.ground_truth import GroundTruth
+from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody
 from scenewright.stages.agent.obstacle_map import CELL
 from scenewright.stages.agent.scene_map import Mapped
 from scenewright.stages.agent.senses import Detection, SeenFurniture, Sweep
@@ -57,6 +59,23 @@ def apartment_of(bodies: Sequence[SceneBody], where: str) -> Apartment:
         start=(*_point((low + high) / 2), 0.0),
     )
     return reconstructed.model_copy(update={"start": roomiest(reconstructed)})
+
+
+def lived_in(truth: GroundTruth) -> tuple[Apartment, Path]:
+    """Return the true room of a generated log as an apartment, and the folder of its scene. Raises BadInput for a scan,
+    of which there is no room."""
+    room = truth.path("room")
+    if truth.info.source == "scan":
+        raise BadInput(
+            f"{truth.root}: the truth of a scan has no room to live in",
+            hint="give the ground truth of a room that `scenewright synthesize` made",
+        )
+    return apartment_of(InteractiveSceneFile.read(room / "scene.json").bodies, str(truth.root)), room
+
+
+def truth_of(truth: GroundTruth | None) -> str:
+    """Return the content digest by which an episode names the true room that it happened in; empty without one."""
+    return truth.manifest.content_digest if truth is not None and truth.manifest is not None else ""
 
 
 def mapped(known: Apartment) -> Mapped:

@@ -127,6 +127,9 @@ def _fill(body: ElementTree.Element, link: Link, add_mesh: Callable[[Shape, bool
             }
             if shape.mesh is not None:
                 attributes |= {"type": "mesh", "mesh": add_mesh(shape, kind == "visual")}
+            elif shape.round is not None:  # a radius, then half of the length
+                sizes = np.asarray(shape.round.sizes) * (1.0, 0.5)[: len(shape.round.sizes)]
+                attributes |= {"type": shape.round.kind, "size": numbers(sizes)}
             else:
                 attributes |= {"type": "box", "size": numbers(0.5 * np.asarray(shape.box_size))}
             if kind == "collision" and link.friction is not None:

@@ -42,8 +42,19 @@ MAXIMUM_BYTES = 64 * 2**20
 
 
 @dataclass(frozen=True)
+class Primitive:
+    """A shape that is neither mesh nor box."""
+
+    kind: str
+    """`sphere`, `cylinder` or `capsule` along z; as it was read, another word where URDF has no such shape."""
+    sizes: tuple[float, ...]
+    """Radius, and length where the kind has one [m], of a capsule between its balls' centres; empty for a kind that
+    URDF does not have."""
+
+
+@dataclass(frozen=True)
 class Shape:
-    """A mesh file (relative to the URDF) or a box, where it sits in its link, its colour."""
+    """A mesh file (relative to the URDF), a box, or something round, where it sits in its link, its colour."""
 
     mesh: str | None = None
     scale: float = 1.0
@@ -51,15 +62,8 @@ class Shape:
     link_from_shape: np.ndarray = field(default_factory=lambda: np.eye(4))
     color: tuple[float, float, float, float] | None = None
     """RGBA in 0..1; visuals only."""
-
-
-@dataclass(frozen=True)
-class Primitive:
-    """A shape that is neither mesh nor box. Read to be checked; scenes have none."""
-
-    kind: str
-    sizes: tuple[float, ...]
-    """Radius, and length where the kind has one [m]; empty for a kind that URDF does not have."""
+    round: Primitive | None = None
+    """Of scenes that others made; `parse_urdf` keeps those that it reads apart (`Link.primitives`)."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,7 @@ class Link:
     friction: float | None = None
     """Sliding friction of its surface on one of the same kind; None when the file says nothing."""
     primitives: tuple[Primitive, ...] = ()
+    """Read to be checked, without their places."""
 
 
 @dataclass(frozen=True)
@@ -153,8 +158,11 @@ def _geometry(parent: ElementTree.Element, shape: Shape) -> None:
         ElementTree.SubElement(geometry, "mesh", attributes)
     elif shape.box_size is not None:
         ElementTree.SubElement(geometry, "box", size=numbers(shape.box_size))
+    elif shape.round is not None:
+        sizes = zip(("radius", "length"), shape.round.sizes, strict=False)
+        ElementTree.SubElement(geometry, shape.round.kind, {key: number(value) for key, value in sizes})
     else:
-        raise ValueError("a shape is a mesh or a box")
+        raise ValueError("a shape is a mesh, a box, or round")
 
 
 def _link_element(link: Link) -> ElementTree.Element:

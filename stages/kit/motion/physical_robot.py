@@ -158,6 +158,8 @@ class PhysicalRobot:
         """Close the fingers on an item. Raises MotionFailed `grasp_lost` when not both of them press on it."""
         description = self.description
         self.robot.finger_force = description.firm_finger_force if firm else description.finger_force
+        if self.world.anchored:
+            self.world.anchor_friction()
         self._opening = 0.0
         self.wait(GRIP_SECONDS)
         if not self.robot.grasps(item):
@@ -188,6 +190,8 @@ class PhysicalRobot:
 
     def release(self) -> None:
         """Open the fingers and let the item come to rest."""
+        if self.held is not None:
+            self.world.loosen(self.held)
         self.held = None
         self.robot.finger_force = self.description.finger_force
         self._opening = self.description.opening

@@ -166,3 +166,21 @@ def build_soup(
     corners, normals, smooth, colors, instances, rows = joined
     rows_of_table = np.stack([material.row() for material in table])
     return TriangleSoup(corners, normals, smooth, colors, instances, rows, rows_of_table)
+
+
+def moved_soup(soup: TriangleSoup, pose: np.ndarray) -> TriangleSoup:
+    """Return the triangles under a rigid motion (4, 4)."""
+    turn = pose[:3, :3].T.astype(np.float32)
+    return replace(
+        soup,
+        corners=soup.corners @ turn + pose[:3, 3].astype(np.float32),
+        face_normals=soup.face_normals @ turn,
+        corner_normals=soup.corner_normals @ turn,
+    )
+
+
+def joined_soups(soups: Sequence[TriangleSoup]) -> TriangleSoup:
+    """Return the triangles of several soups without materials, at least one, as one."""
+    names = ("corners", "face_normals", "corner_normals", "corner_colors", "instance", "material")
+    columns = {name: np.concatenate([getattr(soup, name) for soup in soups]) for name in names}
+    return TriangleSoup(**columns, material_table=soups[0].material_table)

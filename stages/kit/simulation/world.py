@@ -34,6 +34,8 @@ GRAVITY = 9.81
 """Acceleration of what falls [m/s²]."""
 FRICTION = 0.6
 """Friction coefficient of links whose file has none; Bullet multiplies the values of the two links of a contact."""
+MOVABLE_FILTER = (1, -1)
+"""Bullet's collision group of what moves, and the groups that it meets."""
 JOINT_FRICTION = 0.4
 """Torque [N m] or force [N] that holds an unpowered door or drawer where it was left."""
 
@@ -84,6 +86,8 @@ class PhysicsWorld:
         self.stepped = 0
         """`revision` of the last time step."""
         self._base_from_inertial: dict[int, np.ndarray] = {}
+        self.anchored = False
+        """Whether friction is anchored, of all but what was loosened."""
         self.time = 0.0
         engine.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
         engine.setPhysicsEngineParameter(
@@ -277,12 +281,27 @@ class PhysicsWorld:
 
     def anchor_friction(self) -> None:
         """Let what sticks by friction stay where it sticks. Friction solved for speeds alone lets things creep on a
-        carrier that moves for long: centimetres in 20 s on a tray. What pulls harder than friction holds still slides.
+        carrier that moves for long, or turn in a hand: centimetres in 20 s on a tray. What pulls harder than friction
+        holds still slides.
         """
+        self.anchored = True
         for body in self.bodies.values():
             if body.record.movable:
-                for link in (-1, *body.links.values()):
-                    engine.changeDynamics(body.body_id, link, frictionAnchor=1, physicsClientId=self.client)
+                self._anchor(body, True)
+
+    def loosen(self, name: str) -> None:
+        """Take the anchors off a body that is let go, until friction is anchored again. A finger that opens would take
+        along what is anchored to it; the engine anchors contacts, and forgets those of a body that comes anew."""
+        if not self.anchored:
+            return
+        body = self.bodies[name]
+        self._anchor(body, False)
+        for link in body.links.values():
+            engine.setCollisionFilterGroupMask(body.body_id, link, *MOVABLE_FILTER, physicsClientId=self.client)
+
+    def _anchor(self, body: LoadedBody, anchored: bool) -> None:
+        for link in (-1, *body.links.values()):
+            engine.changeDynamics(body.body_id, link, frictionAnchor=int(anchored), physicsClientId=self.client)
 
     def settle(self, seconds: float = 1.0) -> dict[str, float]:
         """Let the world fall for some simulated seconds; return how far each movable body moved [m]."""

@@ -178,7 +178,7 @@ class _Reader:
         geometry = element.find("geometry")
         if geometry is None:
             raise BadInput(f"{where}: no geometry")
-        pose = self._pose_in_link(element, link)
+        pose = pose_in_link(self.tree, element, link)
         color = None
         for kind, looks in LOOKS.items():
             for look in element.iterfind(looks):
@@ -201,16 +201,6 @@ class _Reader:
             return []
         self.allowance.take_counts(len(solid.faces), len(solid.vertices))
         return [solid_surface(solid, color, name).moved(pose)]
-
-    def _pose_in_link(self, element: ElementTree.Element, link: Frame) -> np.ndarray:
-        """Return link_from_shape (4, 4); a shape's pose may be relative to any frame of its model."""
-        pose, said = pose_element(element, link.where), element.find("pose")
-        base = "" if said is None else said.get("relative_to") or said.get("frame") or ""
-        if not base:
-            return pose
-        frame = self.tree.named(base, link.scope, link.where)
-        model_from_base = self.tree.pose_of_scope(link.scope) if frame is None else self.tree.pose(frame)
-        return inverse(self.tree.pose(link)) @ model_from_base @ pose
 
     def _submesh(
         self, mesh: ElementTree.Element, surfaces: list[Surface], pose: np.ndarray, link: str
@@ -261,7 +251,7 @@ class _Reader:
             self.findings.append(coupled(frame.name, mimic.get("joint", "")))
         xyz = element.find("xyz")
         axis = numbers("0 0 1" if xyz is None else xyz.text, 3, f"{where}: axis")
-        model_from_axis = self._frame_of_axis(frame, element)
+        model_from_axis = frame_of_axis(self.tree, frame, element)
         lower, upper = (
             float(numbers(element.findtext(f"limit/{key}") or default, 1, f"{where}: {key}")[0])
             for key, default in (("lower", "-1e16"), ("upper", "1e16"))
@@ -275,21 +265,33 @@ class _Reader:
             self.findings.append(f"joint {frame.name!r:.40} slides without limits: held fast")
         return replace(result, kind="fixed" if result.kind == "prismatic" else "continuous")
 
-    def _frame_of_axis(self, joint: Frame, axis: ElementTree.Element) -> np.ndarray:
-        """Return model_from_frame (4, 4) of the frame in which a joint's axis is written."""
-        xyz = axis.find("xyz")
-        name = "" if xyz is None else xyz.get("expressed_in", "")
-        in_model = (axis.findtext("use_parent_model_frame") or "").strip() in ("1", "true")
-        if in_model and joint.scope.version >= NO_PARENT_MODEL_FRAME:
-            in_model = False
-            self.findings.append(
-                f"joint {joint.name!r:.40}: use_parent_model_frame means nothing since SDF 1.7: its axis is in its own"
-                " frame"
-            )
-        if not name and not in_model and joint.scope.version >= AXES_IN_JOINT_FRAMES:
-            return self.tree.pose(joint)
-        frame = self.tree.named(name or "__model__", joint.scope, f"{joint.where}: axis")
-        return self.tree.pose_of_scope(joint.scope) if frame is None else self.tree.pose(frame)
+
+def frame_of_axis(tree: SdfTree, joint: Frame, axis: ElementTree.Element) -> np.ndarray:
+    """Return model_from_frame (4, 4) of the frame in which a joint's axis is written, model: the outermost one."""
+    xyz = axis.find("xyz")
+    name = "" if xyz is None else xyz.get("expressed_in", "")
+    in_model = (axis.findtext("use_parent_model_frame") or "").strip() in ("1", "true")
+    if in_model and joint.scope.version >= NO_PARENT_MODEL_FRAME:
+        in_model = False
+        tree.findings.append(
+            f"joint {joint.name!r:.40}: use_parent_model_frame means nothing since SDF 1.7: its axis is in its own"
+            " frame"
+        )
+    if not name and not in_model and joint.scope.version >= AXES_IN_JOINT_FRAMES:
+        return tree.pose(joint)
+    frame = tree.named(name or "__model__", joint.scope, f"{joint.where}: axis")
+    return tree.pose_of_scope(joint.scope) if frame is None else tree.pose(frame)
+
+
+def pose_in_link(tree: SdfTree, element: ElementTree.Element, link: Frame) -> np.ndarray:
+    """Return link_from_shape (4, 4); a shape's pose may be relative to any frame of its model."""
+    pose, said = pose_element(element, link.where), element.find("pose")
+    base = "" if said is None else said.get("relative_to") or said.get("frame") or ""
+    if not base:
+        return pose
+    frame = tree.named(base, link.scope, link.where)
+    model_from_base = tree.pose_of_scope(link.scope) if frame is None else tree.pose(frame)
+    return inverse(tree.pose(link)) @ model_from_base @ pose
 
 
 def _primitive(geometry: ElementTree.Element, where: str) -> Solid | None:

@@ -105,6 +105,7 @@ class SdfTree:
         placed.extend((include if own_pose else model).findall("pose"))
         frame = include.findtext("placement_frame") if own_pose else model.get("placement_frame")
         placed.set("placement_frame", (frame or "").strip())
+        placed.extend(include.findall("static"))
         placed.set("name", (include.findtext("name") or model.get("name") or "").strip())
         self._add_model(placed, model, scope, file, sdf_version(root), depth)
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scenewright.schemas.plan import Check
 from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.simulation.carriers import HAND
 from scenewright.stages.kit.tasks.strips import Schema
 from scenewright.stages.plan.action import Execution, MotionRequest, PlanAction
 from scenewright.stages.plan.believed_tree import TreeState
-from scenewright.stages.plan.carriers import HAND
 from scenewright.stages.plan.checks import GoalInRoom
 from scenewright.stages.plan.pick_place import plan_pick
 from scenewright.stages.plan.world_model import RobotState, WorldModel

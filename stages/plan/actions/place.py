@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.simulation.carriers import carried_by, carrier
 from scenewright.stages.kit.tasks.strips import Schema
 from scenewright.stages.plan.action import Execution, MotionRequest, PlanAction
 from scenewright.stages.plan.believed_tree import TreeState
-from scenewright.stages.plan.carriers import carried_by, carrier
 from scenewright.stages.plan.checks import check_in, check_on
 from scenewright.stages.plan.pick_place import GraspStyle, plan_place
 from scenewright.stages.plan.placements import PUT_DOWN_HEIGHT, nearest_level, placement_style

@@ -62,6 +62,29 @@ def bare_scene() -> object:
     return apartment_of([], "scene")
 
 
+def scan_lived_in() -> object:
+    """Live in the room of a scan."""
+    from scenewright.schemas.ground_truth import GroundTruth
+    from scenewright.stages.agent.world.reconstructed import lived_in
+
+    Path("scan").mkdir()
+    about = GroundTruth(Path(golden()) / "ground_truth").info.model_copy(update={"source": "scan"})
+    about.write(Path("scan") / "ground_truth.json")
+    return lived_in(GroundTruth(Path("scan")))
+
+
+def given_episode_in_a_room(folder: Path) -> None:
+    """An episode in the room of the golden truth."""
+    from tests.unit.viewing.artifacts import seal
+
+    shutil.copytree(Path(golden()) / "agent_episode", folder / "lived")
+    manifest = json.loads((Path(golden()) / "ground_truth" / "manifest.json").read_text())
+    document = json.loads((folder / "lived" / "episode.json").read_text())
+    document |= {"simulation": "physics", "room": manifest["content_digest"]}
+    (folder / "lived" / "episode.json").write_text(json.dumps(document))
+    seal(folder / "lived", "agent_episode")
+
+
 def goal_in_words() -> object:
     """Read a goal in words of one's own."""
     from scenewright.schemas.contact_graph import ContactGraphFile
@@ -104,8 +127,8 @@ TEACH = "predicates teach --out l --dry-run"
 EVALUATE = "predicates evaluate --out e --each 1 --states 10 "
 ROWS = [
     Tried(AGENT, "--task is empty", "agent run --task ' ' --out a --dry-run", RUN),
-    agent("--scene and --truth go together", "--scene {golden}/interactive_scene", SCENE),
-    agent("--world and --scene are two rooms", SCENE + "--world {golden}/agent_episode/apartment.json", SCENE),
+    agent("--scene is what the robot knows of a room", "--scene {golden}/interactive_scene", SCENE),
+    agent("--world and --truth are two rooms", SCENE + "--world {golden}/agent_episode/apartment.json", SCENE),
     agent("give --simulation physics too", "--segmenter http://127.0.0.1:9", SEGMENTER + "--arm ours", then_code=5),
     agent("--segmenter errs as it does", SEGMENTER + "--arm oracle", "--simulation physics --arm oracle"),
     agent("give --brain language too", RECORDED, "--brain language " + RECORDED, given=given_transcript),
@@ -128,6 +151,28 @@ ROWS = [
         then_code=5,
         given=given_seen_episode,
         shows="no segmentation service answers",
+    ),
+    Tried(
+        "stages/agent/replay_stage.py",
+        "leave --truth out",
+        "agent replay --episode {golden}/agent_episode --truth {golden}/ground_truth --out again",
+        "agent replay --episode {golden}/agent_episode --out again --accept differs",
+        code=3,
+    ),
+    Tried(
+        "stages/agent/replay_stage.py",
+        "give --truth with that ground truth",
+        "agent replay --episode lived --out again",
+        "agent replay --episode lived --truth {golden}/ground_truth --out again --dry-run",
+        code=3,
+        given=given_episode_in_a_room,
+    ),
+    Tried(
+        "stages/agent/world/reconstructed.py",
+        "the truth of a scan has no room",
+        scan_lived_in,
+        RUN + "--truth {golden}/ground_truth",
+        code=3,
     ),
     Tried("stages/agent/world/generation.py", "choose another --seed", without_draws, RUN + "--seed 1"),
     Tried(
@@ -159,6 +204,12 @@ ROWS = [
         "--goal and --task cannot be given",
         PLAN + ON + "--task tidy-the-desk --dry-run",
         PLAN + ON + "--dry-run",
+    ),
+    Tried(
+        "stages/plan/parameters.py",
+        "with --eyes true nothing is segmented",
+        PLAN + ON + "--segmenter-errors detector --dry-run",
+        PLAN + ON + "--segmenter-errors detector --eyes camera --dry-run",
     ),
     Tried(
         "stages/plan/parameters.py",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 from scenewright.cli.main import run
@@ -12,6 +13,7 @@ from scenewright.stages.report.outlook import Facts, outlook
 
 from tests.advice.inputs import golden, room
 from tests.advice.rows import Tried
+from tests.unit.urdf.other_scenes import TABLE, cup, mjcf, urdf
 
 OUTLOOK = "stages/report/outlook.py"
 
@@ -54,6 +56,20 @@ def given_chair(folder: Path) -> None:
 
     (folder / "models").mkdir()
     trimesh.creation.box((0.5, 0.5, 0.9)).export(folder / "models" / "chair.obj")
+
+
+def given_others(folder: Path) -> None:
+    """Two cups on a table, as others would write them, and a folder that holds something else."""
+    blocks = [TABLE, cup(0.8), cup(0.8, "mug", 0.3)]
+    urdf(folder / "s.urdf", blocks)
+    mjcf(folder / "s.xml", blocks)
+    (folder / "full").mkdir()
+    (folder / "full" / "thesis.tex").touch()
+
+
+def others(path: str, says: str, first: str, then: str, **more: Any) -> Tried:
+    """Return a row about `urdf protocol` on these."""
+    return Tried(path, says, f"urdf protocol {first}", f"urdf protocol {then}", given=given_others, **more)
 
 
 ROWS = [
@@ -131,4 +147,11 @@ ROWS = [
         lacks=("mujoco",),
         given=given_mjcf,
     ),
+    others("cli/urdf_protocol_command.py", "--out", "s.urdf --out full", "s.urdf --out out"),
+    others("stages/library/importing/scenes/opening.py", "--root", "s.urdf --root full", "s.urdf --root ."),
+    others("stages/urdf/protocol_yield.py", "--seen", "s.urdf --seen 1", "s.urdf --seen 2"),
+    others(
+        "stages/urdf/protocol_text.py", "--seen N", "s.urdf", "s.urdf --seen 4", code=0, shows="yield: 2 of 4 (50.0 %)"
+    ),
+    others("stages/library/importing/scenes/mjcf_scene.py", "pip install", "s.xml", "s.xml", code=5, lacks=("mujoco",)),
 ]

@@ -13,13 +13,14 @@ from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.scene_map import Region
 from scenewright.stages.agent.senses import Base, Position, SeenFurniture, Sweep
 from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.before_fronts import bases_outside
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.doors import doored
 from scenewright.stages.agent.world.physics.eyes import HEAD, Mask, Surface
-from scenewright.stages.agent.world.physics.fronts import Front, edges, front_seen
-from scenewright.stages.agent.world.physics.looking import is_thing
-from scenewright.stages.agent.world.physics.room import Room
+from scenewright.stages.agent.world.physics.front_seeing import front_seen
+from scenewright.stages.agent.world.physics.fronts import Front, edges
+from scenewright.stages.agent.world.physics.seen import too_wide
 from scenewright.stages.kit.geometry.transforms import apply, look_at
 from scenewright.stages.kit.motion.doors import body_from_moved
 from scenewright.stages.kit.rendering.object_views import Picture
@@ -44,7 +45,7 @@ def at_front(piece: Furniture) -> Position:
 
 @pytest.mark.parametrize("piece", [FRIDGE, DRESSER])
 def test_a_front_looks_into_the_room_and_hides_what_is_inside(piece: Furniture) -> None:
-    room = Room(apartment(piece, "spoon", piece.centre))
+    room = ApartmentRoom(apartment(piece, "spoon", piece.centre))
     made = room.doored[piece.name]
     assert np.allclose(made.pose[:2, 0], (0, -1), atol=1e-9) and room.opened() == set()
     assert room.body("spoon_0", None).on == piece.name
@@ -114,8 +115,8 @@ def test_how_far_it_is_open_is_felt_and_seen() -> None:
 
 
 def test_a_drawer_that_is_taken_for_a_plate_is_no_thing() -> None:
-    assert not is_thing(surface("plate", (1.5, 4.0, 0.4), (2.5, 4.4, 0.6)))
-    assert is_thing(surface("plate", (1.9, 4.0, 0.6), (2.12, 4.22, 0.62)))
+    assert too_wide(surface("plate", (1.5, 4.0, 0.4), (2.5, 4.4, 0.6)))
+    assert not too_wide(surface("plate", (1.9, 4.0, 0.6), (2.12, 4.22, 0.62)))
 
 
 def test_a_leaf_that_swung_wide_is_pushed_from_its_outer_side() -> None:
@@ -168,7 +169,7 @@ def test_an_open_shelf_is_stood_before_on_its_front_alone() -> None:
 
 
 def test_a_drawer_is_opened_by_its_handle_and_shut() -> None:
-    body = PhysicsBody(apartment(DRESSER, "spoon", (2.1, 4.6)), ("spoon",), NO_ERRORS, 2)
+    body = PhysicsBody(ApartmentRoom(apartment(DRESSER, "spoon", (2.1, 4.6))), ("spoon",), NO_ERRORS, 2)
     body.sweep()
     felt = body.pull(at_front(DRESSER), opening=True)
     assert felt.ok and felt.furniture is not None and felt.furniture.size[1] > 0.65
@@ -183,7 +184,7 @@ def test_a_drawer_is_opened_by_its_handle_and_shut() -> None:
 
 
 def test_a_fridge_is_opened_looked_into_and_shut() -> None:
-    body = PhysicsBody(apartment(FRIDGE, "bottle", (1.95, 4.5)), ("bottle",), NO_ERRORS, 2)
+    body = PhysicsBody(ApartmentRoom(apartment(FRIDGE, "bottle", (1.95, 4.5))), ("bottle",), NO_ERRORS, 2)
     body.sweep()
     assert body.pull(at_front(FRIDGE), opening=True).ok and body._room.joint_value("fridge_0") > 0.9
     look = body.look(at_front(FRIDGE), close=False)
@@ -197,7 +198,7 @@ def test_a_fridge_is_opened_looked_into_and_shut() -> None:
 
 
 def test_a_leaf_that_came_half_way_is_pushed_on_and_can_be_shut() -> None:
-    body = PhysicsBody(apartment(FRIDGE, "bottle", (1.95, 4.5)), ("bottle",), NO_ERRORS, 2)
+    body = PhysicsBody(ApartmentRoom(apartment(FRIDGE, "bottle", (1.95, 4.5))), ("bottle",), NO_ERRORS, 2)
     body.sweep()
     assert body.pull(at_front(FRIDGE), opening=True).ok
     room = body._room
@@ -209,7 +210,7 @@ def test_a_leaf_that_came_half_way_is_pushed_on_and_can_be_shut() -> None:
 
 
 def test_a_handle_that_a_far_look_misses_is_found_from_near_by(monkeypatch: pytest.MonkeyPatch) -> None:
-    body = PhysicsBody(apartment(FRIDGE, "bottle", (1.95, 4.5)), ("bottle",), NO_ERRORS, 2)
+    body = PhysicsBody(ApartmentRoom(apartment(FRIDGE, "bottle", (1.95, 4.5))), ("bottle",), NO_ERRORS, 2)
     body.sweep()
     masks = body._looking._segmenter.masks
 
@@ -222,7 +223,7 @@ def test_a_handle_that_a_far_look_misses_is_found_from_near_by(monkeypatch: pyte
 
 
 def test_without_a_handle_nothing_is_pulled(monkeypatch: pytest.MonkeyPatch) -> None:
-    body = PhysicsBody(apartment(FRIDGE, "bottle", (1.95, 4.5)), ("bottle",), NO_ERRORS, 2)
+    body = PhysicsBody(ApartmentRoom(apartment(FRIDGE, "bottle", (1.95, 4.5))), ("bottle",), NO_ERRORS, 2)
     body.sweep()
     monkeypatch.setattr(body._looking, "look_at_front", lambda at, *, close=False: [])
     felt = body.pull(at_front(FRIDGE), opening=True)

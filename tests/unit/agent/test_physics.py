@@ -15,16 +15,16 @@ from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.scene_map import SceneMap, classes_not_of
 from scenewright.stages.agent.senses import Base, Detection, SeenFurniture, Sweep
 from scenewright.stages.agent.world.failures import Rates
+from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.beliefs import Beliefs
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.eyes import Surface, fuse
 from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, Jaws, antipodal_grasps, within_reach
-from scenewright.stages.agent.world.physics.hands import Target, whole_box
+from scenewright.stages.agent.world.physics.hands import Target, grasps_of, whole_box
 from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.kinematics import forward
-from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 from scenewright.stages.kit.simulation.robot_description import load_robot
 
 JAWS = Jaws(0.08, (0.105, 0.033), 0.008)
@@ -47,7 +47,7 @@ ABOVE = (2.0, 2.4, 0.74)
 class PhysicsBodyStub:
     """As much of a body as a map asks for."""
 
-    base, same_thing, enough = Base(0.0, -1.0, 0.0), 0.07, 2
+    base, same_thing = Base(0.0, -1.0, 0.0), 0.07
     obstacles = ObstacleMap(base, 2.9)
 
 
@@ -57,7 +57,7 @@ def table(x: float, width: float) -> SeenFurniture:
 
 @pytest.fixture
 def body() -> Iterator[PhysicsBody]:
-    made = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3)
+    made = PhysicsBody(ApartmentRoom(APARTMENT), ("apple", "plate"), NO_ERRORS, 3)
     yield made
     made.close()
 
@@ -82,7 +82,7 @@ def test_eyes_measure_and_the_hand_holds_by_contact(body: PhysicsBody) -> None:
 
 @pytest.mark.parametrize("robot", ["ur5e", "xarm7"])
 def test_another_arm_looks_takes_and_puts_down(robot: str) -> None:
-    other = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3, robot=robot)
+    other = PhysicsBody(ApartmentRoom(APARTMENT), ("apple", "plate"), NO_ERRORS, 3, robot=robot)
     try:
         other.sweep()
         seen = {d.label: d for d in other.look(ABOVE, close=False).detections}
@@ -138,7 +138,7 @@ def test_what_cannot_be_done_says_why_with_numbers(body: PhysicsBody) -> None:
 def test_a_world_is_its_seed() -> None:
     looks = []
     for _ in range(2):
-        made = PhysicsBody(APARTMENT, ("apple",), Rates(), 5)
+        made = PhysicsBody(ApartmentRoom(APARTMENT), ("apple",), Rates(), 5)
         made.sweep()
         looks.append((made.look(ABOVE, close=False), made.look((2.0, 2.3, 0.76), close=True)))
         made.close()
@@ -154,6 +154,24 @@ def test_grasps_come_from_above_first_and_across_the_narrow_side() -> None:
     assert all(pose[2, 3] > 0.004 for pose in grasps)
     wide = random.uniform(-0.08, 0.08, (4000, 3))
     assert antipodal_grasps(wide, np.tile([0.0, 1.0, 0.0], (4000, 1)), JAWS, floor=-0.08) == []
+
+
+def test_what_is_too_wide_for_the_fingers_is_taken_by_its_rim() -> None:
+    """A bowl of 18 cm, seen from above: the inside of its wall, the outside towards the robot, and its floor."""
+    random = np.random.default_rng(2)
+    angle = random.uniform(-np.pi, np.pi, 6000)
+    wall = np.column_stack([0.09 * np.cos(angle), 0.09 * np.sin(angle), random.uniform(0.0, 0.07, 6000)])
+    wall[:, :2] *= random.choice([0.96, 1.0], 6000)[:, None]
+    low = random.uniform(-0.06, 0.06, (2000, 3)) * (1, 1, 0)
+    points = np.concatenate([wall, low]) + random.normal(0, 0.001, (8000, 3)) + (1.0, 0.0, 0.75)
+    bowl = Surface("bowl", points, np.tile([0.0, 0.0, 1.0], (8000, 1)), "white", 0.0, 1)
+    grasps = grasps_of(Target(bowl, "bowl", 0, 0.75), np.array([0.4, 0.0, 0.0]), JAWS)
+    assert len(grasps) > 8
+    for pose in grasps:
+        assert pose[2, 2] < -0.99, "from above"
+        assert np.hypot(*(pose[:2, 3] - (1.0, 0.0))) == pytest.approx(0.088, abs=0.006), "over the wall"
+    solid = Surface("book", random.uniform(-0.1, 0.1, (8000, 3)) * (1, 1, 0.1), bowl.normals, "white", 0.0, 1)
+    assert not grasps_of(Target(solid, "book", 0, -0.01), np.array([-0.6, 0.0, 0.0]), JAWS), "it has no rim"
 
 
 def test_a_level_hand_grips_what_it_saw_the_front_of_about_its_axis() -> None:
@@ -196,17 +214,6 @@ def test_a_few_grasps_of_each_steepness_and_none_from_behind() -> None:
     assert all(g[0, 2] > 0 for g in grasps if g[2, 2] > -0.99)
 
 
-def test_errors_of_a_segmenter_persist_and_name_what_was_asked_for() -> None:
-    errors = SegmenterErrors(SegmenterRates(confusable=1.0, confused=0.5, missed=0.3), Luck(1), ("apple", "plate"))
-    regions = [(side, near) for side in range(4) for near in (False, True)]
-    labels = [errors.class_of("can_0", "can", *region) for region in regions]
-    assert labels == [errors.class_of("can_0", "can", *region) for region in regions]
-    assert len(set(labels)) == 2 and set(labels) < {"can", "apple", "plate"}
-    missed = [errors.misses(f"can_{k}", 0, 1, False) for k in range(400)]
-    assert 0.2 < np.mean(missed) < 0.4
-    assert not SegmenterErrors(SegmenterRates(0, 0, 0, 0), Luck(1), ("apple",)).misses("can_0", 0, 1, False)
-
-
 def test_a_way_goes_around_what_is_known() -> None:
     room = ObstacleMap(Base(0.0, 0.0, 0.0), 2.7)
     free = np.argwhere(np.ones((41, 41), bool))
@@ -230,7 +237,7 @@ def test_who_stands_too_near_first_goes_away() -> None:
 def test_what_is_put_into_a_box_does_not_drag_it_along() -> None:
     box = Thing(name="fruit-box_0", label="fruit box", on="table_0", at=(2.3, 2.35), carries=True, radius=0.13)
     apartment = APARTMENT.model_copy(update={"things": (THINGS[0], box)})
-    body = PhysicsBody(apartment, ("apple", "fruit box"), NO_ERRORS, 3)
+    body = PhysicsBody(ApartmentRoom(apartment), ("apple", "fruit box"), NO_ERRORS, 3)
     body.sweep()
     seen = {d.label: d for d in body.look(ABOVE, close=False).detections}
     x, y, z = seen["fruit box"].position

@@ -112,7 +112,12 @@ def test_an_episode_in_a_mapped_room_replays_and_its_log_holds_the_turns(tmp_pat
         label="rules",
         width=300,
     )
-    replay(AgentEpisode(tmp_path / "a"), parameters=ReplayParameters(image_width=300), context=context(tmp_path / "b"))
+    replay(
+        AgentEpisode(tmp_path / "a"),
+        None,
+        parameters=ReplayParameters(image_width=300),
+        context=context(tmp_path / "b"),
+    )
     assert content_digest(record_files(tmp_path / "a", ())) == content_digest(record_files(tmp_path / "b", ()))
     with IndexedMcap(tmp_path / "a" / "episode.mcap") as log:
         topics = {channel.topic: number for number, channel in log.channels.items()}

@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 from scenewright.schemas.errors import BadInput, MissingDependency, UsageError
 from scenewright.stages.agent import replay_stage, run_stage
+from scenewright.stages.agent.goals import FURNITURE
+from scenewright.stages.agent.goals import THINGS as THINGS_KNOWN
 from scenewright.stages.agent.parameters import ReplayParameters, RunParameters, check_run
 from scenewright.stages.agent.segmenter_identity import versions
 from scenewright.stages.agent.world.physics import looking
-from scenewright.stages.agent.world.physics.asked import AskedSegmenter, word_of
+from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.body import PhysicsBody
+from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter, word_of
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.rendering.object_views import Picture
 from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedServer
@@ -36,6 +39,7 @@ from scenewright.stages.kit.stage import Context
 
 from tests.unit.agent.test_physics import ABOVE, APARTMENT, NO_ERRORS, TABLE, THINGS
 
+KNOWN = (*THINGS_KNOWN, *FURNITURE)
 CHROMA = {"apple": (1.0, 0.16, 0.13), "cup": (0.13, 0.3, 1.0), "dining table": (1.0, 0.79, 0.54)}
 INFO = ServiceInfo(
     "by colour",
@@ -93,7 +97,8 @@ def test_the_robot_sees_by_the_masks_and_by_nothing_true(address: str, monkeypat
 
     take = looking.take
     monkeypatch.setattr(looking, "take", untold)
-    body = PhysicsBody(APARTMENT, ("apple", "plate"), NO_ERRORS, 3, AskedSegmenter(address, 3))
+    asked = AskedSegmenter(address, 3, KNOWN)
+    body = PhysicsBody(ApartmentRoom(APARTMENT), ("apple", "plate"), NO_ERRORS, 3, asked)
     try:
         tables = [piece for piece in body.sweep().furniture if piece.label == "table"]
         assert any(np.allclose(piece.centre, TABLE.centre, atol=0.08) for piece in tables)
@@ -110,7 +115,7 @@ def test_the_robot_sees_by_the_masks_and_by_nothing_true(address: str, monkeypat
 
 def test_words_of_services_become_those_of_the_robot() -> None:
     names = ("dining table", "Couch", "wine_glass", "apple", "teddy bear", "object")
-    assert [word_of(name) for name in names] == ["table", "sofa", "cup", "apple", "teddy bear", "object"]
+    assert [word_of(name, KNOWN) for name in names] == ["table", "sofa", "cup", "apple", "teddy bear", "object"]
 
 
 def context(folder: Path) -> Context:

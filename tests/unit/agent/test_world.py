@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -14,9 +16,9 @@ from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.scene_map import SceneMap
 from scenewright.stages.agent.senses import Base, Sweep
 from scenewright.stages.agent.tasks import TASKS, make_apartment
-from scenewright.stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, Rates
+from scenewright.stages.agent.world.failures import COUNTS, EXECUTIONS, GRASPS, PLACES, TABLE_3_4, PrintedEyes, Rates
 from scenewright.stages.agent.world.fast import FastWorld
-from scenewright.stages.kit.rendering.segmenter_errors import Luck
+from scenewright.stages.kit.acting.errors import Luck, segmenter_rates
 
 NOTHING_FAILS = Rates().scaled(0.0, 0.0)
 
@@ -85,7 +87,10 @@ def test_rates_give_the_printed_counts_over_the_assumed_executions() -> None:
     rates = Rates()
     assert (rates.base + rates.slip) * GRASPS == pytest.approx(COUNTS["grasp"])
     assert (rates.shut + rates.roll) * PLACES == pytest.approx(COUNTS["place"])
-    assert rates.confusable * rates.confused * 5 * GRASPS == pytest.approx(COUNTS["false_positive"])
+    printed = PrintedEyes()
+    assert (rates.eyes.missed, rates.eyes.wrong_name, rates.eyes.name_alike.other_region) == pytest.approx(
+        (printed.missed, printed.wrong_name, printed.other_region), rel=0.01
+    )
     assert rates.api * EXECUTIONS == pytest.approx(COUNTS["api"])
     assert sum(direct for direct, _ in TABLE_3_4.values()) == 14
 
@@ -93,7 +98,7 @@ def test_rates_give_the_printed_counts_over_the_assumed_executions() -> None:
 def test_what_failed_fails_again_until_something_changes() -> None:
     """The same grasp slips for ever unless the thing lies anew; a bad base pose stays bad; another view shows more."""
     apartment = make_apartment(TASKS["place_fruit"], 1)
-    sure = Rates(slip=1.0, base=0.0, confusable=0.0, hidden=0.0, missed=0.0)
+    sure = Rates(segmenter_rates("thesis").times(0.0), slip=1.0, base=0.0)
     fruit = next(t for t in apartment.things if t.label in ("apple", "banana", "orange", "lemon"))
     world = FastWorld(apartment, (fruit.label,), sure, 1)
     at = (*fruit.at, 0.76)
@@ -103,7 +108,7 @@ def test_what_failed_fails_again_until_something_changes() -> None:
     stuck = FastWorld(apartment, (fruit.label,), Rates(base=1.0), 1)
     assert [stuck.grasp(at, fruit.label, k).ok for k in range(3)] == [False] * 3
     assert [e.replanned for e in stuck.events] == [False, True, True]
-    again = FastWorld(apartment, (fruit.label,), Rates(confusable=1.0, confused=0.5), 1)
+    again = FastWorld(apartment, (fruit.label,), Rates(replace(segmenter_rates("thesis"), wrong_name=0.5)), 1)
     assert again.look(at, close=True).detections == again.look(at, close=True).detections
 
 

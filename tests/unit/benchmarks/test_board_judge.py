@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import pytest
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import Relation
+from scenewright.stages.urdf.motions import BodyMotion
 from scenewright.stages.urdf.scene_penetration import Overlap
-from scenewright.stages.urdf.settle_report import BodyMotion, SettleReport
+from scenewright.stages.urdf.settle_report import SettleReport
 
 from benchmarks.board import judge
 from benchmarks.board.judge import loose_by_truth, loose_things, of_physics

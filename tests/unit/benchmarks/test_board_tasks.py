@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.interactive_scene import InteractiveSceneFile
+from scenewright.schemas.plan import PlanFile
 from scenewright.schemas.scene_parts import Joint
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.doors import body_from_moved
@@ -18,6 +19,7 @@ from scenewright.stages.plan.execution_log import write_execution
 from scenewright.stages.plan.pictures import picture_camera
 
 from benchmarks.board.records import Line, Trial
+from benchmarks.board.tasks import running
 from benchmarks.board.tasks.carrying import Counterparts, carry, one_to_one
 from benchmarks.board.tasks.drawing import Task, draw_tasks, load_tray
 from benchmarks.board.tasks.figures import failure_counts, task_shares
@@ -25,6 +27,7 @@ from benchmarks.board.tasks.measuring import records_of, told_of
 from benchmarks.board.tasks.room_facts import RoomFacts, room_facts
 from benchmarks.board.tasks.running import TaskRecord
 from benchmarks.board.tasks.true_end import Ending, read_ending, which_hold
+from benchmarks.experiments import plan_true_rooms
 from tests.unit.simulation.handmade_scene import HandmadeBody, kitchen, table, write_scene
 
 FAR = 3.0
@@ -252,3 +255,33 @@ def test_a_line_of_a_room_holds_the_records_of_its_tasks() -> None:
 def test_nothing_measured_is_no_figure() -> None:
     shares = task_shares([record("a", (False,), "not_in_map", ("cup_5",))])
     assert shares["camera/success in the map"].value is None
+
+
+# --- a perfect map --------------------------------------------------------------------------------------------
+
+
+def test_where_the_map_is_the_true_room_a_task_is_asked_for_as_it_is(
+    room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    truth = tmp_path / "truth"
+    truth.mkdir()
+    (truth / "room").symlink_to(room)
+    asked: list[tuple[str, ...]] = []
+
+    def planned(name, out, given, *, seed, scene, ground_truth):  # type: ignore[no-untyped-def]
+        assert (name, given["eyes"], scene.root, ground_truth.root) == ("plan", "true", truth / "room", truth)
+        asked.append(given["goal"])
+        out.mkdir(parents=True)
+        plan = PlanFile(goal=given["goal"], planned_in="reconstructed", executed_in=None, actions=(), status="planned")
+        plan.write(out / "plan.json")
+
+    monkeypatch.setattr(running, "facts_of", lambda path: facts_of(room))
+    monkeypatch.setattr(running, "opened", lambda kind, path: kind(path))
+    monkeypatch.setattr(running, "unrecorded", planned)
+    records = list(running.run_true_room(running.TaskRoom("room-7", truth, 7), tmp_path / "scratch", "true"))
+    assert [record.asked for record in records] == asked == [record.goal + record.keeps for record in records]
+    assert {(record.status, record.success, record.failure) for record in records} == {
+        ("planned", False, running.SOMETHING_ELSE)
+    }
+    of_moves = plan_true_rooms.of_kind("move", plan_true_rooms.RoomTasks(tuple(records)))
+    assert of_moves is not None and {record.kind for record in of_moves.tasks} == {"move"}

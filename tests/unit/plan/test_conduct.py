@@ -216,7 +216,8 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> Tries:
     monkeypatch.setattr(conduct_module, "refine_action", refine)
     monkeypatch.setattr(conduct_module, "grasp_style", lambda *_: "any")
     physical = SimpleNamespace(action=-1, held=None)
-    return Tries(SimpleNamespace(), Room({}, {}, {}), physical, {}, {}, BUDGETS, np.random.default_rng(0), True, 3)  # type: ignore[arg-type]
+    model = SimpleNamespace(snapshot=lambda: "before")
+    return Tries(model, Room({}, {}, {}), physical, {}, {}, BUDGETS, np.random.default_rng(0), True, 3)  # type: ignore[arg-type]
 
 
 CLOSE, PLACE = act("close", "hinge"), act("place", "cup", "shelf")
@@ -271,6 +272,27 @@ def test_a_tray_lost_while_it_is_levelled_is_a_failed_action_and_no_crash(
     after, done = tries._act(START, [act("pick", "tray", "desk")], "start", 0, [])
     assert not done and after is not None and float(after.base[0]) == 9.0  # back along the way
     assert [failure.kind for failure in tries.failures] == ["grasp_lost"]
+
+
+@pytest.mark.parametrize(("held", "step"), [("cup", PLACE), (None, CLOSE)])
+def test_what_is_held_is_looked_at_once_more_from_where_it_is_put_down(
+    tries: Tries, monkeypatch: pytest.MonkeyPatch, held: str | None, step: Step
+) -> None:
+    """It turns in the fingers on the way, whatever the eyes tell."""
+    looked: list[str] = []
+
+    def refine(model, state, name, request, origin):  # type: ignore[no-untyped-def]
+        return [drive(origin, "there"), act(name, *request.arguments)], state
+
+    def look(before, state, steps, request, origin):  # type: ignore[no-untyped-def]
+        looked.append(steps[1].name)
+        return steps[1:], state
+
+    monkeypatch.setattr(conduct_module, "refine_action", refine)
+    monkeypatch.setattr(tries, "_look_from_there", look)
+    tries.physical.held = held
+    tries._act(RobotState(np.zeros(3), np.zeros(7), held), [step], "start", 0, [])
+    assert looked == (["place"] if held else [])
 
 
 def test_what_was_lost_on_the_way_cannot_be_placed(tries: Tries) -> None:

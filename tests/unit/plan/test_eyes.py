@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors, SegmenterRates, segmenter_rates
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.segments import Segment
-from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.world import load_scene, read_scene_bodies
 from scenewright.stages.plan.camera_eyes import CameraEyes
 from scenewright.stages.plan.erring_robot import ErringRobot
-from scenewright.stages.plan.eyes import NoisyEyes, Room, TrueEyes
+from scenewright.stages.plan.eyes import Room
 from scenewright.stages.plan.pictures import RoomPictures
 from scenewright.stages.plan.pose_fit import fit_upright
+from scenewright.stages.plan.room_segmenter import room_segmenter
 from scenewright.stages.plan.world_model import WorldModel
 
-NEVER = SegmenterErrors(SegmenterRates(confusable=0.0, hidden=0.0, missed=0.0), Luck(0), ())
-ALWAYS = SegmenterErrors(SegmenterRates(missed=1.0), Luck(0), ())
+NEVER = segmenter_rates("thesis").times(0.0)
+ALWAYS = replace(NEVER, missed=1.0)
 
 
 def box_surface(random: np.random.Generator, count: int, sides: int = 5) -> np.ndarray:
@@ -64,30 +66,24 @@ def sight(scene: Path, kitchen_model: WorldModel) -> Iterator[SimpleNamespace]:
     kitchen_model.restore(before)
 
 
-def test_noisy_eyes_see_from_where_the_robot_believes_to_stand_or_miss(sight: SimpleNamespace) -> None:
-    true = TrueEyes(sight.model, sight.room, sight.robot, {})
-    exact = np.array(true.seen("cup_5", "cup_5")[0].world_from_body)
-    seen = NoisyEyes(true, sight.robot, NEVER).seen("cup_5", "cup_5")
-    assert seen is not None
-    assert np.array(seen[0].world_from_body)[:3, 3] - exact[:3, 3] == pytest.approx([0.01, -0.02, 0.0], abs=1e-3)
-    assert NoisyEyes(true, sight.robot, ALWAYS).seen("cup_5", "cup_5") is None
+def eyes_of(sight: SimpleNamespace, rates: SegmenterRates = NEVER) -> CameraEyes:
+    """Camera eyes with a simulated segmenter."""
+    pictures = RoomPictures(sight.world, sight.room.records, sight.room.texts, load_robot("panda"))
+    segmenter = room_segmenter(sight.room, sight.world, SegmenterErrors(rates, Luck(0), ("bottle", "cup")))
+    return CameraEyes(sight.model, pictures, sight.robot, segmenter, np.random.default_rng(0), 0.5)
 
 
 def test_camera_eyes_fit_what_is_carried_and_know_no_truth(sight: SimpleNamespace) -> None:
     """The bottle stands on the table, not where it is believed; what is missed or fixed is not seen."""
     sight.model.world.set_pose("bottle_7", transform_from_yaw(0.0, np.array([-1.25, -1.05, 0.75])))
     sight.world.set_pose("bottle_7", transform_from_yaw(0.4, np.array([-1.3, -1.1, 0.75])))
-    pictures = RoomPictures(sight.world, sight.room.records, sight.room.texts, load_robot("panda"))
 
-    def eyes(errors: SegmenterErrors) -> CameraEyes:
-        return CameraEyes(sight.model, sight.room, pictures, sight.robot, errors, np.random.default_rng(0), 0.5)
-
-    seen = eyes(NEVER).seen("bottle_7", "")
+    seen = eyes_of(sight).seen("bottle_7", "")
     assert seen is not None
     pose = inverse(sight.robot.map_from_true()) @ np.array(seen[0].world_from_body)
     assert pose[:3, 3] == pytest.approx([-1.3, -1.1, 0.75], abs=0.015)
-    assert eyes(ALWAYS).seen("bottle_7", "") is None
-    table = eyes(NEVER).seen("table_3", "")
+    assert eyes_of(sight, ALWAYS).seen("bottle_7", "") is None
+    table = eyes_of(sight).seen("table_3", "")
     assert table is not None
     pose = inverse(sight.robot.map_from_true()) @ np.array(table[0].world_from_body)
     assert pose[2, 3] == pytest.approx(sight.world.pose("table_3")[2, 3], abs=0.01)
@@ -101,8 +97,7 @@ def test_camera_eyes_do_not_take_a_thing_for_another_of_its_class(sight: SimpleN
         sight.model.world.set_pose("bottle_8", believed)
         sight.model.world.set_pose("bottle_7", transform_from_yaw(0.0, np.array([-1.3, -1.1, 0.75])))
         sight.world.set_pose("bottle_7", transform_from_yaw(0.0, np.array([-1.3, -1.1, 0.75])))
-        pictures = RoomPictures(sight.world, sight.room.records, sight.room.texts, load_robot("panda"))
-        eyes = CameraEyes(sight.model, sight.room, pictures, sight.robot, NEVER, np.random.default_rng(0), 0.5)
+        eyes = eyes_of(sight)
         assert eyes.seen("bottle_8", "") is None
         assert eyes.seen("bottle_7", "") is not None
     finally:
@@ -114,8 +109,7 @@ def test_camera_eyes_find_what_fell_to_the_floor(sight: SimpleNamespace) -> None
     lying = transform_from_yaw(0.3, np.array([-0.75, -0.3, 0.04]))
     lying[:3, :3] = lying[:3, :3] @ np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])
     sight.world.set_pose("bottle_7", lying)
-    pictures = RoomPictures(sight.world, sight.room.records, sight.room.texts, load_robot("panda"))
-    eyes = CameraEyes(sight.model, sight.room, pictures, sight.robot, NEVER, np.random.default_rng(0), 0.5)
+    eyes = eyes_of(sight)
     seen = eyes.seen("bottle_7", "")
     assert seen is not None
     pose = inverse(sight.robot.map_from_true()) @ np.array(seen[0].world_from_body)
@@ -131,9 +125,7 @@ def test_camera_eyes_find_furniture_nearer_than_it_was_believed(sight: SimpleNam
     believed = true.copy()
     believed[0, 3] += 0.04
     sight.model.world.set_pose("fridge_2", believed)
-    pictures = RoomPictures(sight.world, sight.room.records, sight.room.texts, load_robot("panda"))
-    random = np.random.default_rng(0)
-    seen = CameraEyes(sight.model, sight.room, pictures, sight.robot, NEVER, random, 0.5).seen("fridge_2", "")
+    seen = eyes_of(sight).seen("fridge_2", "")
     assert seen is not None
     pose = inverse(sight.robot.map_from_true()) @ np.array(seen[0].world_from_body)
     assert pose[0, 3] == pytest.approx(true[0, 3], abs=0.012)

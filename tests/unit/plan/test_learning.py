@@ -11,10 +11,10 @@ from scenewright.schemas.errors import UsageError
 from scenewright.schemas.plan import BodyMatch, Failure
 from scenewright.stages.kit.geometry.transforms import inverse, transform_from_yaw
 from scenewright.stages.kit.motion.segments import Manipulation
+from scenewright.stages.kit.simulation.carriers import HAND
 from scenewright.stages.kit.tasks.strips import GroundAction, ground
 from scenewright.stages.kit.tasks.task_planner import plan_task
 from scenewright.stages.plan.assumptions import believe, match_beliefs, parse_priors
-from scenewright.stages.plan.carriers import HAND
 from scenewright.stages.plan.domain import DOMAIN
 from scenewright.stages.plan.joined_bodies import _roll_pitch_yaw
 from scenewright.stages.plan.learning import Lessons

@@ -11,9 +11,9 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.plan import Failure, TriedPlan
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.simulation.carriers import HAND, NOTHING
 from scenewright.stages.kit.tasks.strips import GroundAction, Problem
 from scenewright.stages.plan.believed_tree import TreeState
-from scenewright.stages.plan.carriers import HAND, NOTHING
 from scenewright.stages.plan.reading import Reading
 from scenewright.stages.plan.refinement import Attempt, Step
 from scenewright.stages.plan.replanning import Replanning, in_the_middle

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
-from scenewright.stages.plan.rim_grasps import rim_grasps
 from scenewright.stages.plan.seen_carrier import SeenCarrier, carrier_text, seen_carrier
 
 LONG, WIDE, RIM, GRIP = 0.24, 0.16, 0.015, 0.047

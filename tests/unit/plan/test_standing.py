@@ -7,19 +7,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenewright.schemas.base import as_transform
+from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
 from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.kinematics import forward
+from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.plan import pick_place
 from scenewright.stages.plan.pick_place import HAND_END, PALM_BEHIND, Budgets, palm_bottom, plan_pick
-from scenewright.stages.plan.placements import PUT_DOWN_HEIGHT, sample_placements
+from scenewright.stages.plan.placements import PUT_DOWN_HEIGHT, Placement, sample_placements, untaken
 from scenewright.stages.plan.regions import CELL
 from scenewright.stages.plan.world_model import RobotState, WorldModel
 from scipy.spatial.transform import Rotation
 
-from tests.unit.simulation.handmade_scene import kitchen, write_scene
+from tests.unit.simulation.handmade_scene import HandmadeBody, bottle, kitchen, write_scene
 
 PANDA = load_robot("panda")
+FAR, BAR = np.array([1.0, 1.0, 0.0]), [((0.0, 0.0, 0.05), (0.16, 0.04, 0.1))]
+"""Where a bar stands at first; its box."""
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +113,32 @@ def test_turns_of_regions_go_on_among_the_roomy_ones(model: WorldModel) -> None:
     assert len(set(levels)) >= 2 and len(set(levels[: len(set(levels))])) == len(set(levels))
 
 
+def test_a_place_that_is_taken_is_none(model: WorldModel) -> None:
+    """The cup stands in the middle of the table; the bottle, 6 cm square, goes anywhere but there."""
+    model.world.set_pose("cup_5", transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])))
+    drawn = sample_placements(model, "bottle_7", "table_3", None, np.random.default_rng(0), 400)
+    free = untaken(model, "bottle_7", "table_3", drawn)
+    from_cup = [np.abs(place.world_from_item[:2, 3] - [-1.3, -1.0]).max() for place in free]
+    beside = [place for place in drawn if np.linalg.norm(place.world_from_item[:2, 3] - [-1.3, -1.0]) > 0.15]
+    assert min(from_cup) > 0.035 + 0.03 and len(beside) <= len(free) < len(drawn)
+
+
+def test_a_long_thing_is_turned_to_where_it_has_room(tmp_path: Path) -> None:
+    """Between two walls 10 cm apart a bar 16 cm long stands along them."""
+    wall = [((side * 0.055, 0.0, 0.1), (0.01, 0.4, 0.2)) for side in (-1, 1)]
+    bodies = [
+        *kitchen()[:3],
+        HandmadeBody("box_8", "box", transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])), wall, "table_3"),
+        HandmadeBody("book_9", "book", transform_from_yaw(0.0, FAR), BAR, "floor_1", movable=True, mass=0.2),
+    ]
+    write_scene(tmp_path, bodies)
+    model = WorldModel(tmp_path, ContactGraphFile.read(tmp_path / "graph.json"), PANDA, 0.004)
+    across = Placement(transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.756])), False, False)
+    (turned_place,) = untaken(model, "book_9", "table_3", [across])
+    assert abs(turned_place.world_from_item[1, 0]) == pytest.approx(1.0)
+    model.close()
+
+
 # --- hands ----------------------------------------------------------------------------------------------------
 
 
@@ -170,3 +201,72 @@ def test_a_hand_that_would_reach_below_the_foot_comes_last(
     assert below == sorted(below), "no hand over the edge is tried before one that is not"
     if style == "rather_level":  # among either, those from the side come first
         assert tried == sorted(tried)
+
+
+def test_what_turns_a_heavy_thing_least_in_the_fingers_is_tried_first(
+    model: WorldModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bottle of a kilogram, its middle 10 cm up: taken there it does not turn, 6 cm beside with 0.6 N m."""
+    levers: list[float] = []
+
+    def note(model, state, item, source, base, grasp, arm_planner, tally):  # type: ignore[no-untyped-def]
+        levers.append(abs(float((model.pose(item) @ grasp.body_from_tool)[2, 3]) - 0.85))
+
+    monkeypatch.setattr(pick_place, "_try_pick", note)
+    monkeypatch.setattr(pick_place, "_bases_around", lambda *_: np.zeros((3, 3)))
+    record = model.records["bottle_7"]
+    monkeypatch.setitem(model.records, "bottle_7", record.model_copy(update={"mass": 1.0}))
+    model.world.set_pose("bottle_7", transform_from_yaw(0.0, np.array([-1.3, -1.0, 0.75])))
+    with pytest.raises(MotionFailed):
+        plan_pick(
+            model,
+            RobotState(np.zeros(3), PANDA.carry),
+            "bottle_7",
+            "table_3",
+            Budgets(4, 4000, 10, 1),
+            np.random.default_rng(0),
+            style="level",
+        )
+    assert max(levers) > 0.05 and max(levers[: len(levers) // 8]) < 0.01
+
+
+# --- ways out -------------------------------------------------------------------------------------------------
+
+
+def under_a_cover(root: Path, headroom: float) -> WorldModel:
+    """A bottle 20 cm high on a table, in a case that is open all around."""
+    top, inside = 0.02 + 0.2 + headroom, 0.75
+    case = [((0.0, 0.0, 0.01), (0.5, 0.3, 0.02)), ((0.0, 0.0, top + 0.01), (0.5, 0.3, 0.02))]
+    bodies = [
+        *kitchen()[:3],
+        HandmadeBody("shelf_8", "shelf", transform_from_yaw(0.0, np.array([-1.3, -1.15, inside])), case, "table_3"),
+        bottle(-1.3, -1.2, inside + 0.02, "shelf_8", "supports", "bottle_9"),
+    ]
+    write_scene(root, bodies)
+    return WorldModel(root, ContactGraphFile.read(root / "graph.json"), PANDA, 0.004)
+
+
+@pytest.mark.parametrize(
+    ("headroom", "lifts"), [(0.002, (0.0,)), (0.014, (0.0,)), (0.02, (0.012, 0.0)), (0.2, (0.03, 0.012, 0.0))]
+)
+def test_a_thing_is_lifted_no_farther_than_there_is_room_under_its_cover(
+    tmp_path: Path, headroom: float, lifts: tuple[float, ...]
+) -> None:
+    """With the clearance of 4 mm kept; cover and floor of the case are one link."""
+    model = under_a_cover(tmp_path, headroom)
+    assert pick_place._lifts(model, "bottle_9", "shelf_8") == lifts
+    model.close()
+
+
+@pytest.mark.parametrize(("headroom", "lifted"), [(0.002, 0.0), (0.2, 0.03)])
+def test_a_thing_that_cannot_be_lifted_under_its_cover_slides_out(
+    tmp_path: Path, headroom: float, lifted: float
+) -> None:
+    model = under_a_cover(tmp_path, headroom)
+    state = RobotState(np.zeros(3), PANDA.carry)
+    base = np.array([-1.3, -1.75, np.pi / 2])
+    budgets = Budgets(4, 4000, 800, 8)
+    motion = plan_pick(model, state, "bottle_9", "shelf_8", budgets, np.random.default_rng(0), style="level", base=base)
+    tools = [base_pose(base, PANDA) @ forward(model.chain, row[3:]) for row in motion.segments[2].path]
+    assert max(tool[2, 3] for tool in tools[:3]) - tools[0][2, 3] == pytest.approx(lifted, abs=5e-3)
+    model.close()

@@ -10,22 +10,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors, segmenter_rates
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
-from scenewright.stages.kit.rendering.segmenter_errors import Luck, SegmenterErrors, SegmenterRates
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.world import load_scene, read_scene_bodies
+from scenewright.stages.plan.affordances import has_rim
 from scenewright.stages.plan.camera_eyes import CameraEyes, Look
 from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Room
 from scenewright.stages.plan.pictures import RoomPictures
-from scenewright.stages.plan.rim_grasps import has_rim
+from scenewright.stages.plan.room_segmenter import room_segmenter
 from scenewright.stages.plan.world_model import WorldModel
 
 from tests.unit.plan.test_tray_loading import tray
 from tests.unit.simulation.handmade_scene import floor, table, write_scene
 
-NEVER = SegmenterErrors(SegmenterRates(confusable=0.0, hidden=0.0, missed=0.0), Luck(0), ())
+NEVER = SegmenterErrors(segmenter_rates("thesis").times(0.0), Luck(0), ())
 PANDA = load_robot("panda")
 
 
@@ -46,7 +47,7 @@ def sight(tmp_path: Path) -> Iterator[SimpleNamespace]:
         start = Configuration(np.array([0.0, -0.8, np.pi / 2]), PANDA.carry, PANDA.opening)
         robot = ErringRobot(world, PANDA, start, 1.0, np.random.default_rng(0))
         pictures = RoomPictures(world, records, texts, PANDA)
-        eyes = CameraEyes(model, room, pictures, robot, NEVER, np.random.default_rng(0), 0.5)
+        eyes = CameraEyes(model, pictures, robot, room_segmenter(room, world, NEVER), np.random.default_rng(0), 0.5)
         yield SimpleNamespace(model=model, world=world, robot=robot, eyes=eyes)
     model.close()
 

@@ -10,10 +10,11 @@ import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.acting.hand.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, rim_grasps
 from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.shapes import surface_points
-from scenewright.stages.plan.rim_grasps import DEPTH, FOOT_ROOM, LEAST_DEPTH, askew, has_rim, rim_grasps
+from scenewright.stages.plan.affordances import has_rim
 from scenewright.stages.plan.tray_loading import (
     GRAVITY,
     PALM_ROOM,

@@ -110,3 +110,24 @@ def test_anchored_friction_is_still_friction(tmp_path: Path, slope: float, slide
         engine.setGravity(*gravity, physicsClientId=world.client)
         moved = world.settle(1.0)["bottle_1"]
     assert moved > 0.1 if slides else moved < 1e-3
+
+
+def test_what_is_loosened_is_as_if_it_had_never_been_anchored(tmp_path: Path) -> None:
+    write_scene(tmp_path, [floor(), bottle(0.0, 0.0, 0.0, "floor_1", name="bottle_1")])
+
+    def pushed(anchored: bool, loosened: bool) -> float:
+        with load_scene(tmp_path) as world:
+            if anchored:
+                world.anchor_friction()
+            world.settle(0.2)  # the engine remembers what touches meanwhile
+            if loosened:
+                body = world.bodies["bottle_1"].body_id
+                assert world.contacts(body)
+                world.loosen("bottle_1")
+                assert bool(world.contacts(body)) != anchored  # forgotten, and found anew by the next step
+            engine.setGravity(1.4, 0.0, -9.7, physicsClientId=world.client)
+            return world.settle(1.0)["bottle_1"]
+
+    creeping, loose, anchored = pushed(False, False), pushed(True, True), pushed(True, False)
+    assert loose == pytest.approx(creeping, rel=0.05) and anchored < 0.5 * creeping
+    assert pushed(False, True) == creeping  # what is not anchored is left alone

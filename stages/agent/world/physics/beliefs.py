@@ -8,13 +8,12 @@ import numpy as np
 from scenewright.schemas.base import as_transform
 from scenewright.stages.agent.world.physics.fronts import Front
 from scenewright.stages.agent.world.physics.shapes import record_of, slab, urdf_of
+from scenewright.stages.kit.acting.belief import BelievedRoom
 from scenewright.stages.kit.acting.query import NOTHING, CollisionQuery, carrying
-from scenewright.stages.kit.motion.collision import CollisionChecker
-from scenewright.stages.kit.motion.kinematics import arm_chain
-from scenewright.stages.kit.simulation.robot import Configuration, Robot
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
-from scenewright.stages.kit.simulation.world import PhysicsWorld
 
+CLEARANCE = 0.004
+"""Distance kept from what is believed in [m]; by eye."""
 HELD = "held"
 """Name of the box of what is in the hand."""
 Box = tuple[np.ndarray, np.ndarray]
@@ -36,21 +35,12 @@ class Hold:
     its middle swings between the fingers when they turn."""
 
 
-class Beliefs:
-    """Boxes and doors around the robot, for collision checks. A `JointedModel` of the kit."""
+class Beliefs(BelievedRoom):
+    """Boxes and doors around the robot, for collision checks."""
 
     def __init__(self, description: RobotDescription) -> None:
-        self.description = description
-        self.chain = arm_chain(description)
-        self.world = PhysicsWorld()
-        self.robot = Robot(self.world, description)
-        self.checker = CollisionChecker(self.world, self.robot, 0.004)
-        self.robot.set(Configuration(np.zeros(3), description.carry, description.opening))
+        super().__init__(description, CLEARANCE)
         self._boxes: dict[str, object] = {}
-
-    def close(self) -> None:
-        """End the pybullet world."""
-        self.world.close()
 
     def show(self, boxes: dict[str, Believed]) -> None:
         """Believe in these boxes, name -> lower and upper corner (3,) [m] in the map frame, in these fronts, and in
@@ -68,8 +58,7 @@ class Beliefs:
             else:
                 assert isinstance(box, tuple)
                 part = slab(box[:3], tuple(max(h, low + 0.004) for low, h in zip(box[:3], box[3:], strict=True)))  # type: ignore[arg-type]
-                self.world.add_body(record_of(name, "box", (0, 0, 0), 0), urdf_of(name, (part,), 1.0))
-            self.checker.add_body(name)
+                self.add(record_of(name, "box", (0, 0, 0), 0), urdf_of(name, (part,), 1.0))
             self._boxes[name] = box
 
     def _add_front(self, name: str, front: Front) -> None:
@@ -80,11 +69,7 @@ class Beliefs:
                 "joint_values": {front.joint.name: front.value},
             }
         )
-        self.world.add_body(record, front.urdf())
-
-    def pose(self, name: str) -> np.ndarray:
-        """Return map_from_body (4, 4) of what is believed in."""
-        return self.world.pose(name)
+        self.add(record, front.urdf())
 
     def hold(self, hold: Hold | None) -> CollisionQuery:
         """Believe in the box of what is held, or in none; return the query of a hand that carries it."""
@@ -95,8 +80,7 @@ class Beliefs:
             return NOTHING
         half = hold.size / 2
         part = slab(tuple(-half), tuple(half))  # type: ignore[arg-type]
-        self.world.add_body(record_of(HELD, "box", (0, 0, 0), 0), urdf_of(HELD, (part,), 1.0))
-        self.checker.add_body(HELD)
+        self.add(record_of(HELD, "box", (0, 0, 0), 0), urdf_of(HELD, (part,), 1.0))
         self._boxes[HELD] = tuple(half)
         return carrying(HELD, hold.tool_from_box, (HELD,))
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scenewright.schemas.apartment import Apartment, Furniture
+from scenewright.schemas.apartment import Furniture
 from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
 from scenewright.stages.agent.world.events import Event
 from scenewright.stages.agent.world.failures import Rates
-from scenewright.stages.agent.world.physics.asked import AskedSegmenter
 from scenewright.stages.agent.world.physics.driving import Driving
 from scenewright.stages.agent.world.physics.handling import Handling
 from scenewright.stages.agent.world.physics.looking import Looking
-from scenewright.stages.agent.world.physics.oracle import NoisyOracle
+from scenewright.stages.agent.world.physics.oracle import RoomSegmenter
 from scenewright.stages.agent.world.physics.pulling import Pulling
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
 from scenewright.stages.agent.world.physics.room import Body, Room
 from scenewright.stages.agent.world.physics.seen import Seen
-from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors
+from scenewright.stages.kit.acting.errors import SegmenterErrors
+from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter
 from scenewright.stages.kit.simulation.robot_option import USUAL_ROBOT
 
 CLEARANCE = 2.9
@@ -26,31 +26,27 @@ CLEARANCE = 2.9
 
 
 class PhysicsBody:
-    """One episode's world in pybullet. `sought`: classes that the eyes are asked for. `close` it.
+    """One episode's world in pybullet: a robot in a room. `sought`: classes that the eyes are asked for. `close` it.
 
-    What hides a thing is in the way of the camera, so that hiding is not drawn; where the masks are a `segmenter`'s,
-    no error of the eyes is: they are its own.
+    Where the masks are a `segmenter`'s, no error of the eyes is drawn: they are its own.
     """
 
     same_thing, stand_off, short_armed = 0.07, 0.38, True
-    enough = 2
-    """Two are had from one stop, a third is not: where it is driven to for one, all that was measured before is off by
-    both stops' errors."""
 
     def __init__(
         self,
-        apartment: Apartment,
+        room: Room,
         sought: tuple[str, ...],
         rates: Rates,
         seed: int,
         segmenter: AskedSegmenter | None = None,
         robot: str = USUAL_ROBOT,
     ) -> None:
-        rates = replace(rates, hidden=0.0) if segmenter is None else replace(rates, hidden=0.0, feedback=0.0)
-        self.apartment, self._room = apartment, Room(apartment)
+        rates = rates if segmenter is None else replace(rates, feedback=0.0)
+        self.apartment, self._room = room.apartment, room
         self._robot = RobotInRoom(self._room, rates, seed, robot)
         self._asked = segmenter
-        eyes = segmenter or NoisyOracle(self._room, SegmenterErrors(rates, self._robot.luck, sought))
+        eyes = segmenter or RoomSegmenter(self._room, SegmenterErrors(rates.eyes, self._robot.luck, sought))
         seen_by_robot = Seen(self._robot, CLEARANCE)
         self.obstacles = seen_by_robot.obstacles
         self._driving = Driving(self._robot, seen_by_robot)

@@ -131,7 +131,7 @@ class Driving:
         depths: dict[str, float] = {}
         for contact in world.contacts(self._robot.driver.robot.body_id):
             name = world.name_of(contact.other_body)
-            if name is not None and name != "floor" and contact.depth > TOUCHES:
+            if name is not None and world.bodies[name].record.class_name != "floor" and contact.depth > TOUCHES:
                 depths[name] = max(contact.depth, depths.get(name, 0.0))
         return depths
 

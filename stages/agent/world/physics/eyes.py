@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.agent.world.physics.shapes import COLORS, STAIN
+from scenewright.stages.kit.acting.eyes.masks import Mask
 from scenewright.stages.kit.geometry.point_clouds import normals_of_neighbours
 from scenewright.stages.kit.rendering.object_views import Picture, cloud
 from scipy.spatial import cKDTree
@@ -19,6 +19,8 @@ WRIST = Camera(width=240, height=180, fx=175.0, fy=175.0, cx=119.5, cy=89.5)
 """Intrinsics of the wrist camera."""
 NEAR_BY = Camera(width=240, height=180, fx=350.0, fy=350.0, cx=119.5, cy=89.5)
 """The middle of the wrist camera's full resolution, of which looks at a whole surface take every second pixel."""
+FIXTURE = "fixture"
+"""What an oracle calls what stands on furniture or hangs on walls and is no thing: it is in the way."""
 LEAST_POINTS = 16
 """Least points of an object (ConceptGraphs)."""
 VOXEL, OVERLAP = 0.025, 0.5
@@ -29,29 +31,6 @@ NEIGHBOURS = 14
 """Points of which a surface normal is made."""
 STAINED = 0.04
 """Share of a mask that is brown on a used cup."""
-
-
-@dataclass(frozen=True)
-class Mask:
-    """What a segmentation backend made out."""
-
-    label: str
-    mask: np.ndarray
-
-
-class Segmenter(Protocol):
-    """A segmentation backend."""
-
-    missed: set[str]
-    """Things of which an oracle knows that they were in a picture and are not among its masks."""
-
-    def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
-        """Return the furniture of a picture that the head took, from the pose (4, 4) where it believes to be."""
-        ...
-
-    def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
-        """Return the things of a picture. `view` names the region of views."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -1,26 +1,27 @@
 """A door or a drawer as the robot believes in it: of what was seen of its front, and of what such furniture is like.
 
-**Assumed** by the class of furniture as seen: a dresser's front is a drawer that comes straight out, any other's a leaf
-whose hinge is at the edge far from the handle; furniture with a door is hollow. All else is measured: which side the
-handle is on, where and how long its bar is, how wide and high the front, and how far it is open by the arm's joints.
+**Assumed** by the class of furniture as seen: a dresser's front is a drawer that comes straight out, a fridge's a leaf,
+any other's what its mask says; the hinge of a leaf is at the edge far from the handle; furniture with a door is hollow.
+All else is measured: which side the handle is on, where and how long its bar is, how wide and high the front, and how
+far it is open by the arm's joints. Which fronts a piece has is told in `front_seeing.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2
 
 import numpy as np
-from scenewright.schemas.base import as_vector
+from scenewright.schemas.base import Vector3, as_vector
 from scenewright.schemas.scene_parts import Joint
 from scenewright.stages.agent.senses import Position
-from scenewright.stages.agent.world.physics.eyes import Surface
 from scenewright.stages.agent.world.physics.shapes import jointed_text, slab
-from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
+from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.motion.doors import body_from_moved
 
 WITH_DRAWERS, WITH_LEAVES = ("dresser",), ("fridge",)
+OF_EITHER = ("cabinet", "drawer unit", "wardrobe")
+"""Furniture with doors or drawers, and a top on which things lie as well."""
 PARTS = ("handle", "door", "drawer")
 """Words for what moves of furniture: no things."""
 THICK, LEAF = 0.03, 0.02
@@ -45,6 +46,8 @@ NARROWEST = 0.25
 """Least width of a front that was looked at, and not its edge [m]; by eye."""
 EDGE_CELL = 0.01
 """Edge of a cell on which a front's outline is told [m]; by eye."""
+GAP = 0.005
+"""Room between what moves and its neighbours [m]; by eye."""
 TRAY = 0.5
 """Height of the sides of a drawer, as a share of its front's."""
 
@@ -68,6 +71,25 @@ class Front:
     """How far it is open, as felt [rad] or [m]."""
     floor: float | None = None
     """Height on which things inside lie, as seen [m]."""
+    leafless: bool = False
+    """An open shelf: nothing moves, it is always open."""
+    across: tuple[float, float] | None = None
+    """From y to y of the whole furniture, where this is one of several fronts; the rest of it is taken for solid."""
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is the only front of its furniture."""
+        return self.across is None
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Middle of its handle when it is shut (3,), in the map."""
+        return apply(self.map_from_front, np.array([self.joint.handle]))[0]
+
+    @property
+    def low(self) -> float:
+        """Height from which on it is hollow behind the front [m]."""
+        return self.panel[2] - 0.03 if self.slides or not self.alone else 0.0
 
     @property
     def joint(self) -> Joint:
@@ -97,10 +119,13 @@ class Front:
             slab((-x, -w, 0.0), (THICK - x, w, h)),
             slab((-x, -w, 0.0), (inner, THICK - w, h)),
             slab((-x, w - THICK, 0.0), (inner, w, h)),
-            slab((-x, -w, 0.0), (inner, w, z0 if self.slides else THICK)),
+            slab((-x, -w, 0.0), (inner, w, z0 if self.slides else max(z0, THICK))),
             slab((-x, -w, max(z1 if self.slides else 0.0, h - THICK)), (inner, w, h)),
+            *(slab(low, high) for low, high in self.solid()),
         ]
         low, high = np.array(self.bar[0]) - ROOM, np.array(self.bar[1]) + ROOM
+        if self.leafless:  # a speck within its back
+            return jointed_text(self.name, tuple(still), (slab((-x, 0.0, 0.0), (0.002 - x, 0.002, 0.002)),), self.joint)
         moving = [slab((inner, y0, z0), (x, y1, z1 + OVER)), slab(as_vector(low), as_vector(high))]
         if self.slides:
             edge = z0 + TRAY * (z1 - z0)
@@ -112,6 +137,20 @@ class Front:
             ]
         return jointed_text(self.name, tuple(still), tuple(moving), self.joint)
 
+    def solid(self) -> list[tuple[Vector3, Vector3]]:
+        """Return the corners of what is beside, below and above it of furniture with several fronts, own frame."""
+        if self.across is None:
+            return []
+        x, w, h = self.size[0] / 2, self.size[1] / 2, self.size[2]
+        (y0, y1), (z0, z1) = self.across, self.panel[2:]
+        boxes: list[tuple[Vector3, Vector3]] = [
+            ((-x, y0, 0.0), (x, -w, h)),
+            ((-x, w, 0.0), (x, y1, h)),
+            ((-x, -w, 0.0), (x, w, z0 - GAP)),
+            ((-x, -w, z1 + OVER + GAP), (x, w, h)),
+        ]
+        return [(low, high) for low, high in boxes if all(b - a > THICK for a, b in zip(low, high, strict=True))]
+
     def local(self, points: np.ndarray) -> np.ndarray:
         """Return points (N, 3) of the map in its own frame."""
         return apply(inverse(self.map_from_front), points)
@@ -120,14 +159,13 @@ class Front:
         """Return (N,) bool: points of the map that are within it, or within its drawer where that is now."""
         in_front_frame = self.local(points)
         out = self.value if self.slides else 0.0
-        low = self.panel[2] - 0.03 if self.slides else 0.0
         x, w = self.size[0] / 2, self.size[1] / 2
         return (
             (in_front_frame[:, 0] > out - x)
             & (in_front_frame[:, 0] < x + out)
             & (np.abs(in_front_frame[:, 1]) < w)
-            & (in_front_frame[:, 2] > low)
-            & (in_front_frame[:, 2] < self.size[2] - 0.05)
+            & (in_front_frame[:, 2] > self.low)
+            & (in_front_frame[:, 2] < (self.size[2] - 0.05 if self.alone else self.panel[3]))
         )
 
     def behind(self, at: np.ndarray) -> float:
@@ -141,11 +179,14 @@ class Front:
 
     def opening(self) -> Position:
         """Return a place of the map in the middle of a shelf."""
-        x, y, z = apply(self.map_from_front, np.array([(0.0, 0.0, LOOK_AT * self.size[2])]))[0]
+        z0, z1 = (0.0, self.size[2]) if self.alone else self.panel[2:]
+        x, y, z = apply(self.map_from_front, np.array([(0.0, 0.0, z0 + LOOK_AT * (z1 - z0))]))[0]
         return float(x), float(y), float(z)
 
     def of_part(self, points: np.ndarray, room: float) -> np.ndarray:
         """Return (N,) bool: points of the map that are of what moves, where it is now, or within `room` [m] of it."""
+        if self.leafless:
+            return np.zeros(len(points), bool)
         shut = apply(inverse(body_from_moved(self.joint, self.value)), self.local(points))
         y0, y1, z0, z1 = self.panel
         back = STAYS - self.size[0] / 2 if self.slides else self.size[0] / 2 - LEAF
@@ -154,6 +195,8 @@ class Front:
 
     def outline(self) -> np.ndarray:
         """Return points (N, 2) of the map over which what moves stands now, 5 cm apart at most."""
+        if self.leafless:
+            return np.zeros((0, 2))
         x, (y0, y1, _, _) = self.size[0] / 2, self.panel
         xs = np.arange(STAYS - x if self.slides else x - LEAF, x, 0.05)
         grid = np.stack(np.meshgrid(xs, np.arange(y0, y1 + 0.04, 0.05), [0.5]), -1).reshape(-1, 3)
@@ -169,6 +212,14 @@ class Front:
         far = from_hinge[np.hypot(*from_hinge.T) > NEAR_HINGE] * (1.0, -joint.axis[2])
         return float(np.median(np.arctan2(far[:, 0], far[:, 1]))) if len(far) else self.value
 
+    def value_of_bar(self, points: np.ndarray) -> float:
+        """Return how far a drawer is open by points (N, 3) of the map that were seen of its handle [m]."""
+        return float(np.percentile(self.local(points)[:, 0], 95)) - self.bar[1][0]
+
+    def level_with(self, points: np.ndarray) -> bool:
+        """Whether the middle of points (N, 3) of the map is as high as what moves."""
+        return bool(self.panel[2] < np.median(points[:, 2]) < self.panel[3])
+
     def felt(self, tool: np.ndarray, contact: np.ndarray) -> float:
         """Return the joint value at which a point that was at `contact` (3,), own frame, when it was shut is where the
         tool (3,) of the map is now."""
@@ -179,56 +230,6 @@ class Front:
         before, now = contact[:2] - hinge, at[:2] - hinge
         turned = atan2(now[1], now[0]) - atan2(before[1], before[0])
         return float((turned * self.joint.axis[2] + np.pi) % (2 * np.pi) - np.pi)
-
-
-def front_seen(
-    name: str, label: str, box: tuple[np.ndarray, np.ndarray], surfaces: Sequence[Surface], base: np.ndarray
-) -> Front | None:
-    """Return the front of furniture in a box (3,), (3,) of the map by what a look at it from a base pose (3,) showed;
-    None without a handle, or where a side was looked at: of a door that shows an edge, its handle sticks out beyond."""
-    handles = [s.points for s in surfaces if s.label == "handle"]
-    panels = [s.points for s in surfaces if s.label in PARTS[1:]]
-    if not handles:
-        return None
-    low, high = box
-    handle, panel = max(handles, key=len), max([*panels, _facing(box, base)], key=len)
-    across = int(np.ptp(np.percentile(panel[:, :2], (5, 95), axis=0), axis=0).argmin())
-    normal = np.zeros(2)
-    normal[across] = 1.0 if base[across] > np.median(panel[:, across]) else -1.0
-    middle, half_depth, half_width = (low + high) / 2, (high - low)[across] / 2, (high - low)[1 - across] / 2
-    slides = label in WITH_DRAWERS
-    frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*middle[:2], 0.0]))
-    in_frame = apply(inverse(frame), panel)
-    if not panels:
-        in_frame[:, 0] = np.percentile(apply(inverse(frame), handle)[:, 0], 95) - 2 * HALF_BAR - BEHIND_BAR
-    plane = float(np.median(in_frame[:, 0]))
-    (y0, y1), (z0, z1) = edges(in_frame[:, 1:]), edges(in_frame[:, :0:-1])
-    if y1 - y0 < NARROWEST:
-        return None
-    if slides:  # wider than a picture, perhaps
-        y0, y1 = min(y0, -half_width), max(y1, half_width)
-    shift = np.eye(4)
-    shift[:2, 3] = (plane - half_depth) / 2, (y0 + y1) / 2  # the back is where the box ends
-    frame, half_depth, half_width = frame @ shift, (half_depth + plane) / 2, (y1 - y0) / 2
-    bar = apply(inverse(frame), handle)
-    bar = bar[bar[:, 0] > half_depth + BEHIND_BAR / 2]  # what is farther back is the panel seen beside the bar
-    if len(bar) < 5:
-        return None
-    handle_low, handle_high = np.percentile(bar, 5, axis=0), np.percentile(bar, 95, axis=0)
-    if abs(handle_low[1] + handle_high[1]) / 2 > half_width:
-        return None  # seen past an edge: it is on another side
-    handle_low[0] = handle_high[0] - 2 * HALF_BAR
-    extent = (-half_width, half_width, z0 if slides else LEAF, min(z1, float(high[2])))
-    size = (float(2 * half_depth), float(2 * half_width), float(high[2]))
-    return Front(name, label, frame, size, extent, (tuple(handle_low.tolist()), tuple(handle_high.tolist())), slides)
-
-
-def _facing(box: tuple[np.ndarray, np.ndarray], base: np.ndarray) -> np.ndarray:
-    """Return points (N, 3) of the side of a box that faces a base pose (3,): few, for where no panel was seen."""
-    (low, high), across = box, int(np.argmax(np.maximum(box[0] - base, base - box[1])[:2]))
-    grid = np.stack(np.meshgrid(*np.linspace(low, high, 12).T, indexing="ij"), -1)
-    side = grid.take(-1 if base[across] > high[across] else 0, axis=across)
-    return side.reshape(-1, 3)
 
 
 def edges(points: np.ndarray) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from math import hypot
 
 import numpy as np
 from scenewright.stages.agent.senses import Base, Felt, Position
+from scenewright.stages.agent.world.physics.eyes import Surface
 from scenewright.stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
 from scenewright.stages.agent.world.physics.letting_go import DROP, JUST_OVER, SOME_WAY_OVER, Spot, plan_release
 from scenewright.stages.agent.world.physics.looking import Looking
@@ -15,6 +16,8 @@ from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 
+ONE_LEVEL = 0.1
+"""What begins this near to a level stands on it [m]; by eye."""
 CLOSED_ON_NOTHING = 0.004
 """Opening of the fingers below which they hold nothing [m]."""
 
@@ -31,7 +34,7 @@ class Handling:
         self._robot.beliefs.hold(None)
         pose, front = np.array([base.x, base.y, base.yaw]), self._seen.front_at(at)
         forward = front is not None and not front.slides
-        if front is not None and forward and not front.before(pose):
+        if front is not None and forward and not front.before(pose) or self._seen.taken(at):
             return False
         if take and base == self._robot.base:
             self._see_from_here(at)
@@ -112,7 +115,9 @@ class Handling:
         piece = self._seen.piece_at(at)
         measured = self._seen.pieces[piece].measured_top if piece is not None else None
         front = self._seen.front_at(surface.middle)
-        measured = measured if front is None else front.floor
+        if front is not None:  # a shelf, and several fronts, have several levels, of which one was measured
+            one = front.alone and not front.leafless
+            measured = front.floor if one or _near(front.floor, surface) else None
         floor = 0.0 if at[2] < FLOOR else float(surface.low[2]) if measured is None else measured
         if front is None:
             return Target(surface, f"thing_{number}", rank, floor)
@@ -219,6 +224,10 @@ class Handling:
             for x, y, _ in [self._robot.room.lies(name)]
         ]
         return min(by_distance)[1] if by_distance and min(by_distance)[0] <= FOUND_WITHIN else ""
+
+
+def _near(floor: float | None, surface: Surface) -> bool:
+    return floor is not None and abs(floor - float(surface.low[2])) < ONE_LEVEL
 
 
 def _chance(candidate: int) -> np.random.Generator:

@@ -14,6 +14,7 @@ from scenewright.stages.agent.world.physics.grasps import (
     antipodal_grasps,
     within_reach,
 )
+from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -103,7 +104,7 @@ def plan_grasp(
 ) -> Motion:
     """Return the motion that takes a fused surface. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
     surface, name = target.surface, target.name
-    possible = _grasps_of(target, base, Jaws.of(beliefs.description))
+    possible = grasps_of(target, base, Jaws.of(beliefs.description))
     if not possible:
         opening, width = beliefs.description.opening, narrowest_width(surface.points[_inside(surface)])
         raise MotionFailed(
@@ -137,11 +138,11 @@ def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.ran
     """Whether the hand gets straight to some grasp of a fused surface from a base pose (3,) and up again, free of all
     that is in the map."""
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
-    carry, grasps = beliefs.description.carry, _grasps_of(target, base, Jaws.of(beliefs.description))[:CANDIDATES]
+    carry, grasps = beliefs.description.carry, grasps_of(target, base, Jaws.of(beliefs.description))[:CANDIDATES]
     return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
 
 
-def _grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
+def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
     """Return the grasps of what was seen, map_from_tool (4, 4), that an arm on a base pose (3,) may get at."""
     surface = target.surface
     keep = _inside(surface)
@@ -149,8 +150,12 @@ def _grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]
     if target.behind > 0:
         grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], jaws, target.floor, FORWARD_PITCHES)
         return within_reach(grasps, target.inward, STRAIGHT)
-    grasps = antipodal_grasps(surface.points[keep], surface.normals[keep], jaws, target.floor)
-    return within_reach(grasps, heading)
+    grasps = within_reach(antipodal_grasps(surface.points[keep], surface.normals[keep], jaws, target.floor), heading)
+    if grasps:
+        return grasps
+    # what is too wide for the fingers may have a rim: a bowl, a pot, a large cup
+    over_rim = rim_grasps(surface.points[keep], np.eye(4), np.random.default_rng(0))
+    return [grasp.body_from_tool for grasp in over_rim]
 
 
 def _inside(surface: Surface) -> np.ndarray:

@@ -6,28 +6,20 @@ from itertools import product
 from math import atan2, cos, pi, sin
 
 import numpy as np
+from scenewright.stages.agent.goals import FURNITURE
 from scenewright.stages.agent.scene_map import quarter
 from scenewright.stages.agent.senses import Base, Detection, Look, Position, Sweep
 from scenewright.stages.agent.world.physics import head
-from scenewright.stages.agent.world.physics.eyes import (
-    HEAD,
-    NEAR_BY,
-    STAINED,
-    WRIST,
-    Mask,
-    Segmenter,
-    Surface,
-    fuse,
-    seen_in,
-)
+from scenewright.stages.agent.world.physics.eyes import FIXTURE, HEAD, NEAR_BY, STAINED, WRIST, Surface, fuse, seen_in
 from scenewright.stages.agent.world.physics.fronts import PARTS, Front
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
 from scenewright.stages.agent.world.physics.robot_in_room import TOOL_FROM_CAMERA, RobotInRoom
-from scenewright.stages.agent.world.physics.seen import FOUND_WITHIN, Seen
+from scenewright.stages.agent.world.physics.seen import FOUND_WITHIN, Seen, too_wide
+from scenewright.stages.kit.acting.eyes.masks import Mask, Segmenter
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply, inverse, look_at
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
-from scenewright.stages.kit.rendering.object_views import take
+from scenewright.stages.kit.rendering.object_views import Picture, take
 
 SIDEWAYS = (0.0, -0.5, 0.5)
 """Turns of the first joint for the three wrist poses [rad]."""
@@ -37,8 +29,6 @@ FRONT_PITCHES, FRONT_FROM, FRONT_ASIDE = (0.5, 0.3, 0.8, 0.1), (0.6, 0.5, 0.7), 
 """How far down the wrist camera looks at a front [rad], from how far, and beside its middle [m]."""
 INTO_PITCHES, INTO_FROM, INTO_ASIDE = (0.35, 0.2, 0.5, 0.05), (0.6, 0.5, 0.7, 0.8, 0.4), (0.0, 0.12, -0.12)
 """Pitches [rad], distances and shifts aside [m] of looks into a shelf, in the order in which they are tried."""
-WIDEST = 0.5
-"""Largest width of what lies about on furniture or in it [m]; by eye."""
 PICTURE_SECONDS = 0.5
 """Time that a picture takes [s]. **Assumed.**"""
 
@@ -51,6 +41,10 @@ class Looking:
         self._view = looking_arm(robot.beliefs)
         self.looked_near: tuple[Base, Position] | None = None
         """From where it looked last from near by, and at what."""
+        self._furniture = frozenset((*FURNITURE, *(piece.label for piece in robot.room.furniture.values())))
+        """What its eyes call furniture."""
+        self._missed: set[str] = set()
+        """What pictures of this look showed that is not among their masks, as far as somebody knows."""
         self.pictures: list[tuple[str, np.ndarray]] = []
         """What the wrist camera took last, for people."""
 
@@ -70,7 +64,8 @@ class Looking:
                 head.steady(picture.depth).reshape(-1) & ~self._robot.in_hand(points) & ~self._seen.of_parts(points)
             )
             clouds.append(points[is_steady])
-            for entry in self._segmenter.furniture(picture, map_from_true @ pose):
+            masks = self._segmenter.masks(picture, map_from_true @ pose, ("head", turn))
+            for entry in [mask for mask in masks if mask.label in self._furniture]:
                 of_furniture = is_steady & entry.mask.reshape(-1) & (picture.depth.reshape(-1) < head.SURE)
                 if of_furniture.sum() >= head.LEAST:
                     head.enter(self._seen.pieces, entry.label, points[of_furniture])
@@ -89,6 +84,8 @@ class Looking:
         surfaces: list[Surface] = []
         renderer = None
         arms = [turned(self._robot.beliefs.chain, self._view, toward + t) for t in ((0.0,) if close else SIDEWAYS)]
+        if not close:
+            self._seen.keep_shelf(piece)
         shelf = self._seen.front_at(at) if close else self._seen.front_of(piece)
         if shelf is not None and not shelf.slides:
             arms = self._arms_into(shelf, at if close else shelf.opening(), close=close)
@@ -111,23 +108,34 @@ class Looking:
             front = self._seen.front_of(piece)
             if front is not None:
                 self._seen.keep_floor(picture, camera, front)
-            masks = self._segmenter.masks(picture, camera, (sector, close))
-            surfaces += seen_in(picture, _things(masks), camera, camera[:3, 3])
+            masks = self._masks(picture, camera, (sector, close))
+            surfaces += seen_in(picture, self._things(masks), camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"{'near ' if close else ''}{arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
         self._count_missed()
         self.looked_near = (self._robot.base, at) if close else None
         surfaces = [s for s in surfaces if not self._robot.in_hand(s.middle[None])[0]]
-        surfaces_near = [s for s in fuse(surfaces) if is_thing(s) and self._seen.belongs(s, at, piece, close)]
-        self._seen.keep(surfaces_near, at, piece, close)
+        near = [s for s in fuse(surfaces) if not too_wide(s) or s.label == FIXTURE]
+        near = [s for s in near if self._seen.belongs(s, at, piece, close)]
+        self._seen.keep(near, at, piece, close)
+        surfaces_near = [s for s in near if s.label != FIXTURE]
         return Look(tuple(self._detection(s, sector, close, at) for s in surfaces_near), sector, close)
 
+    def _masks(self, picture: Picture, camera: np.ndarray, region: object) -> list[Mask]:
+        masks = self._segmenter.masks(picture, camera, region)
+        self._missed |= self._segmenter.missed
+        return masks
+
+    def _things(self, masks: list[Mask]) -> list[Mask]:
+        """Return the masks without those of furniture and of what moves of it."""
+        return [entry for entry in masks if entry.label not in (*PARTS, *self._furniture)]
+
     def _count_missed(self) -> None:
-        for name in sorted(self._segmenter.missed):
+        for name in sorted(self._missed):
             sought_thing = self._robot.room.things.get(name)
             if sought_thing is None or sought_thing.label in self._sought:
                 self._robot.log.mistaken("missed", f"look {name}")
-        self._segmenter.missed.clear()
+        self._missed.clear()
 
     def look_at_front(self, at: Position, *, close: bool = False) -> list[Surface]:
         """Look at a front from before it, to both sides of a position, or there at twice the resolution: handles, and
@@ -138,7 +146,7 @@ class Looking:
             pose, camera = self._robot.wrist_poses()
             renderer = renderer or self._robot.room.renderer(pose[:3, 3])
             picture = take(renderer, NEAR_BY if close else WRIST, pose, self._robot.random)
-            masks = [m for m in self._segmenter.masks(picture, camera, (sector, close)) if m.label in PARTS]
+            masks = [mask for mask in self._masks(picture, camera, (sector, close)) if mask.label in PARTS]
             surfaces += seen_in(picture, masks, camera, camera[:3, 3])
             self.pictures = [*self.pictures[-40:], (f"front {arm[0]:+.1f}", picture.color)]
             self._robot.seconds_aside += PICTURE_SECONDS
@@ -218,7 +226,7 @@ class Looking:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]
         pose = look_at(eye, tool)
         picture = take(self._robot.room.renderer(eye), WRIST, pose, self._robot.random)
-        masks = _things(self._segmenter.masks(picture, pose, ("hand", view)))
+        masks = self._things(self._segmenter.masks(picture, pose, ("hand", view)))
         by_distance = [
             (float(np.linalg.norm(s.middle - tool)), k, s) for k, s in enumerate(seen_in(picture, masks, pose, eye))
         ]
@@ -232,13 +240,3 @@ class Looking:
         return (
             None if thing_in_hand is None else Detection(thing_in_hand.label, position, thing_in_hand.color, None, 0.04)
         )
-
-
-def is_thing(surface: Surface) -> bool:
-    """Whether a surface is small enough for a thing: what is wider is of furniture, whatever its mask says."""
-    return float((surface.high - surface.low)[:2].max()) < WIDEST
-
-
-def _things(masks: list[Mask]) -> list[Mask]:
-    """Return the masks without those of what moves of furniture."""
-    return [entry for entry in masks if entry.label not in PARTS]

@@ -1,46 +1,38 @@
-"""A segmentation backend out of the true instances of a rendered picture, with the kit's persistent errors."""
+"""A simulated segmenter for rooms of the agent: things and parts of furniture with errors, furniture without."""
 
 from __future__ import annotations
 
 import numpy as np
-from scenewright.stages.agent.world.physics.eyes import Mask
 from scenewright.stages.agent.world.physics.room import Room
-from scenewright.stages.kit.rendering.object_views import LEAST_PIXELS, Picture
-from scenewright.stages.kit.rendering.segmenter_errors import SegmenterErrors
+from scenewright.stages.kit.acting.errors import SegmenterErrors
+from scenewright.stages.kit.acting.eyes.masks import Mask
+from scenewright.stages.kit.acting.eyes.simulated import Shown, SimulatedSegmenter
+from scenewright.stages.kit.rendering.object_views import Picture
 
 
-class NoisyOracle:
-    """Things of a picture, missed or taken for others for good from a region of views."""
+class RoomSegmenter(SimulatedSegmenter):
+    """Things of a picture, handles, doors and drawers, and furniture, with its doors."""
 
     def __init__(self, room: Room, errors: SegmenterErrors) -> None:
-        self._room, self._errors = room, errors
-        self.missed: set[str] = set()
-        """What was in a picture and is not among its masks."""
+        super().__init__(errors, lambda: shown_in(room))
+        self._room = room
 
-    def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
-        """Return the masks of furniture, without errors."""
+    def masks(self, picture: Picture, map_from_camera: np.ndarray, region: object) -> list[Mask]:
+        """Return the masks of a picture."""
         names = {int(number): self._room.named.get(int(number), "") for number in np.unique(picture.instance)}
-        owners = {number: name.split("__")[0] for number, name in names.items()}  # a door is of its furniture
-        return [
+        owners = {number: self._room.owner(name) for number, name in names.items()}
+        furniture = [
             Mask(piece.label, np.isin(picture.instance, [number for number, owner in owners.items() if owner == name]))
             for name, piece in self._room.furniture.items()
             if name in owners.values()
         ]
+        return [*furniture, *super().masks(picture, map_from_camera, region)]
 
-    def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
-        """Return the masks of things, handles, doors and drawers. `view`: ("hand", number), or (quarter turn, near)."""
-        noisy_masks = []
-        for number in np.unique(picture.instance):
-            name = self._room.named.get(int(number), "")
-            mask = picture.instance == number
-            part = self._room.parts.get(name, "")
-            if not part and name not in self._room.things or mask.sum() < LEAST_PIXELS:
-                continue
-            if view[0] != "hand" and self._errors.misses(
-                name, self._room.moved.get(name, 0), int(str(view[0])), bool(view[1])
-            ):
-                self.missed.add(name)
-                continue
-            label = part or self._room.things[name].label
-            noisy_masks.append(Mask(self._errors.class_of(name, label, *view), mask))
-        return noisy_masks
+
+def shown_in(room: Room) -> dict[int, Shown]:
+    """Return the things, fixtures and parts of furniture of a room by their instance numbers."""
+    return {
+        number: Shown(name, room.label(name), room.moved.get(name, 0))
+        for number, name in room.named.items()
+        if room.label(name)
+    }

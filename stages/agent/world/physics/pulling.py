@@ -18,7 +18,8 @@ from scenewright.stages.agent.world.physics.before_fronts import (
     sides_of,
 )
 from scenewright.stages.agent.world.physics.driving import Driving
-from scenewright.stages.agent.world.physics.fronts import PARTS, Front, front_seen
+from scenewright.stages.agent.world.physics.front_seeing import fronts_seen
+from scenewright.stages.agent.world.physics.fronts import PARTS, Front
 from scenewright.stages.agent.world.physics.looking import Looking
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom, felt
 from scenewright.stages.agent.world.physics.seen import Seen
@@ -145,7 +146,7 @@ class Pulling:
         if known_front is not None and known_front.value > 0:
             return known_front  # half open, the handle does not tell where the front is
         if known_front is not None:
-            at = apply(known_front.map_from_front, np.array([known_front.joint.handle]))[0]
+            at = known_front.middle
         else:
             assert middle is not None
             at = np.array([*middle, HEIGHT_OF_LOOK * high[2]])
@@ -153,10 +154,23 @@ class Pulling:
         if not any(s.label == PARTS[0] for s in surfaces):  # a near look shows no whole panel
             surfaces_close = self._looking.look_at_front(_position(at), close=True)
             surfaces += [s for s in surfaces_close if s.label == PARTS[0]]
-        front = front_seen(name, piece.label, (low, high), surfaces, base)
-        if front is not None:
-            self._seen.fronts[name] = front
-        return front
+        fronts = fronts_seen(name, piece.label, (low, high), surfaces, base)
+        if known_front is not None:  # of several, the one that was looked at
+            fronts = sorted(fronts, key=lambda f: float(np.linalg.norm(f.middle - at)))[:1]
+        elif fronts:
+            self._seen.waiting[name] = fronts[1:]
+        if fronts:
+            self._seen.fronts[name] = fronts[0]
+        return fronts[0] if fronts else None
+
+    def _next(self, name: str) -> None:
+        """Take the next of several fronts, where one of them is open: it is shut first. Raises MotionFailed."""
+        front, waiting = self._seen.fronts.get(name), self._seen.waiting.get(name)
+        if front is None or not waiting or not is_open(front.joint, front.value):
+            return
+        self._seen.moved(name, self._shut(name))
+        self._check(self._seen.fronts[name], opening=False)
+        self._seen.fronts[name], self._seen.waiting[name] = waiting[0], waiting[1:]
 
     def _go(self, pose: np.ndarray, label: str) -> bool:
         """Drive to a base pose (3,) before furniture of a class, if the robot does not stand there."""
@@ -172,7 +186,10 @@ class Pulling:
 
     def _open(self, name: str, number: int) -> float:
         """Open a front; return how far it is open by the arm's joints. Raises MotionFailed."""
+        self._next(name)
         front = self._seen.fronts.get(name) or self._find(number)
+        if is_open(front.joint, front.value):
+            return front.value  # as it stood when it was first seen
         tally = Tally()
         for base in self._bases(front):
             if self._drag(front, base, tally) is None or not self._go(base, front.label):
@@ -220,7 +237,8 @@ class Pulling:
         handle = np.array(joint.handle)
         bar = np.array(joint.handle_axis)
         inward = closing_direction(joint, handle)
-        for share in (FAR_OUT, *SHARES) if front.slides else SHARES:
+        shares = (FAR_OUT, *SHARES) if front.slides else SHARES
+        for share in shares if front.alone else shares[:-1]:  # of several, one that is half open hides the others
             values = arc_values(front.value, share * open_value(joint))
             for pitch in PITCHES:
                 contact = ContactPoint(handle, np.array([*(np.cos(pitch) * inward[:2]), -np.sin(pitch)]))
@@ -280,9 +298,17 @@ class Pulling:
     def _see_opening(self, front: Front, value: float) -> float:
         """Return how far a front is open as seen from here; the `value` that was felt, which is finer, where it is not
         seen or the eyes say about the same."""
-        handle = apply(front.map_from_front, np.array([front.joint.handle]))[0]
-        panels = [s for s in self._looking.look_at_front(_position(handle)) if s.label in PARTS[1:]]
-        value_seen = max(0.0, front.value_seen(max(panels, key=lambda s: len(s.points)).points)) if panels else value
+        surfaces = self._looking.look_at_front(_position(front.middle))
+        panels = [s.points for s in surfaces if s.label in PARTS[1:]]
+        if front.alone:
+            value_seen = max(0.0, front.value_seen(max(panels, key=len))) if panels else value
+        else:  # which of several it is, is told by where it should be
+            values = [max(0.0, front.value_seen(points)) for points in panels if front.level_with(points)]
+            if front.slides:  # its front may be out of the picture, and its handle behind it
+                bars = [s.points for s in surfaces if s.label == PARTS[0] and front.level_with(s.points)]
+                value_seen = max([front.value_of_bar(points) for points in bars] + values, default=value)
+            else:
+                value_seen = min(values, key=lambda seen: abs(seen - value), default=value)
         return value if abs(value_seen - value) < SEEN_TO else value_seen
 
     def _tool(self, arm: np.ndarray) -> np.ndarray:
@@ -353,7 +379,7 @@ class Pulling:
         part = joined(link_shapes(front.urdf())[joint.part])
         part.apply_translation(joint.origin)
         z0, z1 = front.panel[2:]
-        heights = (max(0.45, z0), z1)
+        heights = (max(min(0.45, (z0 + z1) / 2), z0), z1)
         contacts = push_points(joint, part, np.random.default_rng(5), 4, heights, opening=end > front.value)
         values = arc_values(front.value, end)
         gap = self._robot.description.tip_overhang - PRESS

@@ -17,13 +17,13 @@ from scenewright.stages.agent.world.events import EventLog
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.physics.beliefs import Beliefs, Hold
 from scenewright.stages.agent.world.physics.room import Room
+from scenewright.stages.kit.acting.errors import Luck
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import forward
 from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
 from scenewright.stages.kit.motion.robot_errors import encoder_errors
 from scenewright.stages.kit.motion.segments import Segment, whole_body
-from scenewright.stages.kit.rendering.segmenter_errors import Luck
 from scenewright.stages.kit.simulation.robot import Configuration, base_pose
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
 

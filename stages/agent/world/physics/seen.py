@@ -11,8 +11,9 @@ from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 from scenewright.stages.agent.world.physics import head
 from scenewright.stages.agent.world.physics.beliefs import Believed
-from scenewright.stages.agent.world.physics.eyes import OVERLAP, Surface, overlap
-from scenewright.stages.agent.world.physics.fronts import WITH_DRAWERS, WITH_LEAVES, Front, footprint
+from scenewright.stages.agent.world.physics.eyes import FIXTURE, OVERLAP, Surface, overlap
+from scenewright.stages.agent.world.physics.front_seeing import open_shelf
+from scenewright.stages.agent.world.physics.fronts import OF_EITHER, WITH_DRAWERS, WITH_LEAVES, Front, footprint
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
 from scenewright.stages.kit.geometry.cameras import back_project
 from scenewright.stages.kit.geometry.transforms import apply
@@ -26,6 +27,8 @@ NEARER = 0.08
 """The folded elbow goes over a drawer: the base stands so much nearer to it than to furniture [m]."""
 BESIDE_PART = 0.06
 """What the head sees so near to a leaf or a drawer is of it [m]."""
+WIDEST = 0.5
+"""Largest width of what lies about on furniture or in it [m]; by eye."""
 AROUND = 1.4
 """What is farther from the base does not matter to the arm [m]."""
 COMFORT = 4.5
@@ -40,7 +43,10 @@ class Seen:
         self.pieces: list[head.SeenPiece] = []
         self.surfaces: list[Surface] = []
         self.fronts: dict[str, Front] = {}
-        """Doors and drawers of which the handle was seen, by the names of `boxes`."""
+        """Doors and drawers of which the handle was seen, by the names of `boxes`: of each piece the one that was
+        opened last, or that will be opened next."""
+        self.waiting: dict[str, list[Front]] = {}
+        """Other doors and drawers of the same pieces that were not opened yet, the next one first."""
         self.obstacles = ObstacleMap(robot.base, clearance, COMFORT)
 
     def furniture(self) -> list[SeenFurniture]:
@@ -62,18 +68,29 @@ class Seen:
         if front is not None and opened and not front.slides:
             outward = float(np.arctan2(*front.map_from_front[1::-1, 0]))
         if front is not None and opened and front.slides:
-            ends = zip(footprint(front, NEARER), (low[2], high[2]), strict=True)
-            low, high = (np.array([*corner, z]) for corner, z in ends)
+            near, far = self._stands_over(number, NEARER)
+            low, high = np.array([*near, low[2]]), np.array([*far, high[2]])
         centre, size = (low + high) / 2, np.maximum(high - low, 0.1)
         return SeenFurniture(
             piece.label,
             (float(centre[0]), float(centre[1])),
             (float(size[0]), float(size[1])),
             float(high[2]),
-            piece.label in (*WITH_DRAWERS, *WITH_LEAVES),
+            piece.label in (*WITH_DRAWERS, *WITH_LEAVES, *OF_EITHER),
             opened,
             outward,
+            piece.label in OF_EITHER,
+            bool(self.waiting.get(f"furniture_{number}")),
         )
+
+    def _stands_over(self, number: int, less: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners (2,), (2,) over which a piece stands, with its drawer, `less` [m] of that one's front; a
+        leaf is left out."""
+        front, (low, high) = self.fronts.get(f"furniture_{number}"), self.pieces[number].box
+        if front is None:
+            return low[:2], high[:2]
+        near, far = footprint(front, less)
+        return (near, far) if front.alone else (np.minimum(near, low[:2]), np.maximum(far, high[:2]))
 
     def keep_floor(self, picture: Picture, map_from_camera: np.ndarray, front: Front) -> None:
         """Measure the height on which things inside an open front lie: the most frequent height there [m]."""
@@ -109,6 +126,16 @@ class Seen:
         point = np.array([at[:3]], float)
         return next((f for f in self.fronts.values() if f.value > 0 and f.inside(point)[0]), None)
 
+    def keep_shelf(self, piece: int | None) -> None:
+        """Believe that a piece of which the inside was seen is an open shelf, open to where the robot stands."""
+        if piece is None or (f"furniture_{piece}" in self.fronts and not self.fronts[f"furniture_{piece}"].leafless):
+            return
+        name, seen = f"furniture_{piece}", self.pieces[piece]
+        points = np.array(sorted(seen.cubes)) * head.GRAIN
+        shelf = open_shelf(name, seen.label, seen.box, points, self._robot.believed)
+        if shelf is not None:
+            self.fronts[name] = shelf
+
     def keep_top(self, picture: Picture, map_from_camera: np.ndarray, piece: int | None) -> None:
         """Measure the height of the top of furniture that fills the picture: the most frequent height [m]."""
         if piece is None:
@@ -127,9 +154,8 @@ class Seen:
         if at[2] < FLOOR:
             return None
         for number, piece in enumerate(self.pieces):
-            front = self.fronts.get(f"furniture_{number}")
-            low, high = piece.box if front is None else footprint(front)
-            if len(piece.cubes) >= head.LEAST and np.all((at[:2] > low[:2] - 0.1) & (at[:2] < high[:2] + 0.1)):
+            low, high = self._stands_over(number)
+            if len(piece.cubes) >= head.LEAST and np.all((at[:2] > low - 0.1) & (at[:2] < high + 0.1)):
                 return number
         return None
 
@@ -192,6 +218,10 @@ class Seen:
                 boxes[f"thing_{number}"] = (low, high)
         return boxes
 
+    def taken(self, at: Position) -> bool:
+        """Whether something stands at a position that is no thing and on which nothing is put."""
+        return any(_covers(surface, at) and surface.label == FIXTURE for surface in self.surfaces)
+
     def beside_on(self, at: Position) -> tuple[str, ...]:
         """Return the names, as of `boxes`, of what lies on the thing that covers a position."""
         carriers = [s for s in self.surfaces if _covers(s, at)]
@@ -212,6 +242,11 @@ class Seen:
         if piece is None:
             return at[2]
         return self.pieces[piece].top
+
+
+def too_wide(surface: Surface) -> bool:
+    """Whether a surface is too wide for a thing: it is of furniture, whatever its mask says."""
+    return float((surface.high - surface.low)[:2].max()) >= WIDEST
 
 
 def _covers(surface: Surface, at: Sequence[float] | np.ndarray) -> bool:

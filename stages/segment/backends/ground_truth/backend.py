@@ -6,11 +6,12 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.sequence import SequenceFile
 from scenewright.schemas.vocabulary import Vocabulary, load_vocabulary
+from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors, segmenter_rates
+from scenewright.stages.kit.acting.spoiled_masks import MaskView, spoiled
 from scenewright.stages.kit.formats.frames import Frame
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.segment.backends.ground_truth import GroundTruthParameters
 from scenewright.stages.segment.backends.ground_truth.corruption import corrupt, rates_of_level
-from scenewright.stages.segment.backends.ground_truth.lasting import LastingErrors, View, measured_rates
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
@@ -58,9 +59,10 @@ class GroundTruthBackend:
             True: tuple(c.id for c in named if c.kind == "thing"),
             False: tuple(c.id for c in named if c.kind == "stuff"),
         }
-        things = {entry.name: entry.id for entry in vocabulary.classes if entry.kind == "thing"}
-        first_free = max(self._masks, default=0) + 1
-        self._lasting = None if lasting == "none" else LastingErrors(measured_rates(lasting), seed, things, first_free)
+        self._ids = {entry.name: entry.id for entry in vocabulary.classes if entry.kind == "thing"}
+        self._lasting = None
+        if lasting != "none":
+            self._lasting = SegmenterErrors(segmenter_rates(lasting), Luck(seed), self._ids)
 
     def __call__(self, frame: Frame, geometric: GeometricFrame, random: np.random.Generator) -> PanopticFrame:
         """Return the masks of a frame. Raises BadInput when the frame has no labels."""
@@ -70,11 +72,22 @@ class GroundTruthBackend:
         present = set(np.unique(ids).tolist()) - {0}
         true = PanopticFrame(ids=ids, masks={i: self._masks[i] for i in sorted(present)})
         if self._lasting is not None:
-            pose = np.eye(4) if frame.world_from_camera is None else frame.world_from_camera
-            seen = frame.depth > 0 if frame.depth is not None else np.zeros(ids.shape, bool)
-            view = View(apply(pose, geometric.points), seen, pose[:3, 3], frame.index)
-            return self._lasting.spoil(true, view)
+            return self._with_lasting_errors(true, frame, geometric, self._lasting)
         return corrupt(true, self._rates, self._classes, random) if self._corrupted else true
+
+    def _with_lasting_errors(
+        self, true: PanopticFrame, frame: Frame, geometric: GeometricFrame, errors: SegmenterErrors
+    ) -> PanopticFrame:
+        pose = np.eye(4) if frame.world_from_camera is None else frame.world_from_camera
+        seen = frame.depth > 0 if frame.depth is not None else np.zeros(true.ids.shape, bool)
+        class_names = {number: name for name, number in self._ids.items()}
+        things = {k: class_names[mask.class_id] for k, mask in true.masks.items() if mask.is_thing}
+        bare = (true.ids > 0) & ~np.isin(true.ids, list(things))
+        view = MaskView(apply(pose, geometric.points), seen, bare, pose[:3, 3], frame.index)
+        ids, told = spoiled(true.ids, things, view, errors, max(self._masks, default=0) + 1)
+        masks = {k: PanopticMask(self._ids[name], True) for k, name in told.items()}
+        stuff = set(np.unique(ids).tolist()) & (set(true.masks) - set(things))
+        return PanopticFrame(ids, masks | {k: true.masks[k] for k in stuff})
 
 
 def open_backend(request: BackendRequest) -> GroundTruthBackend:

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 
-import cv2
 import numpy as np
+from scenewright.stages.kit.acting.spoiled_masks import displace_boundaries, touching
 from scenewright.stages.segment.panoptic import PanopticFrame, PanopticMask
-
-BOUNDARY_WAVELENGTH = 24
-"""Pixels at a width of 640 between the points at which boundary displacement is drawn."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +49,10 @@ def corrupt(
             del masks[mask_id]
     for mask_id in _things(masks):
         if random.random() < rates.merge and mask_id in masks:
-            beside = list(touching_things(ids, masks, mask_id))
+            beside = list(touching(ids, _things(masks), mask_id))
             if beside:
-                merge(ids, masks, mask_id, beside[int(random.integers(len(beside)))])
+                ids[ids == mask_id] = beside[int(random.integers(len(beside)))]
+                del masks[mask_id]
     for mask_id in _things(masks):
         if random.random() < rates.split:
             _split(ids, masks, mask_id, random)
@@ -69,20 +67,6 @@ def corrupt(
 
 def _things(masks: dict[int, PanopticMask]) -> list[int]:
     return sorted(mask_id for mask_id, mask in masks.items() if mask.is_thing)
-
-
-def touching_things(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int) -> dict[int, int]:
-    """Return the things that touch a mask (within two pixels), by rising id, each with its pixels there."""
-    own = (ids == mask_id).astype(np.uint8)
-    around = (cv2.dilate(own, np.ones((5, 5), np.uint8)) != 0) & (own == 0)
-    found = zip(*np.unique(ids[around], return_counts=True), strict=True)
-    return {int(i): int(count) for i, count in found if i in masks and masks[int(i)].is_thing}
-
-
-def merge(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, into: int) -> None:
-    """Give the pixels of a mask to another."""
-    ids[ids == mask_id] = into
-    del masks[mask_id]
 
 
 def _split(ids: np.ndarray, masks: dict[int, PanopticMask], mask_id: int, random: np.random.Generator) -> None:
@@ -105,20 +89,3 @@ def _flipped(mask: PanopticMask, classes: dict[bool, tuple[int, ...]], random: n
     if not others:
         return mask
     return replace(mask, class_id=others[int(random.integers(len(others)))])
-
-
-def displace_boundaries(ids: np.ndarray, deviation: float, random: np.random.Generator) -> np.ndarray:
-    """Return ids (H, W) resampled through a smooth random displacement of standard deviation `deviation` [pixels]
-    per axis: boundaries wander, labels stay whole."""
-    height, width = ids.shape
-    spacing = max(2.0, BOUNDARY_WAVELENGTH * width / 640)
-    coarse = (int(np.ceil(height / spacing)) + 3, int(np.ceil(width / spacing)) + 3)
-    v, u = np.mgrid[0:height, 0:width].astype(np.float32)
-    shift = []
-    for _ in range(2):
-        drawn = random.standard_normal(coarse).astype(np.float32)
-        smooth = cv2.remap(drawn, u / spacing + 1, v / spacing + 1, cv2.INTER_CUBIC)
-        shift.append(smooth / max(float(smooth.std()), 1e-6) * deviation)
-    source_u = np.clip(np.rint(u + shift[0]), 0, width - 1).astype(np.intp)
-    source_v = np.clip(np.rint(v + shift[1]), 0, height - 1).astype(np.intp)
-    return ids[source_v, source_u]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.vocabulary import load_vocabulary
-from scenewright.stages.agent.goals import FURNITURE, THINGS
-from scenewright.stages.agent.world.physics.eyes import Mask
+from scenewright.stages.kit.acting.eyes.masks import Mask
 from scenewright.stages.kit.formats.frames import Frame
 from scenewright.stages.kit.rendering.object_views import LEAST_PIXELS, Picture
 from scenewright.stages.kit.services.segmentation_client import connect, read_info
@@ -22,44 +23,39 @@ ALIASES = ("coco", "nyu40", "scannet", "ade20k")
 """Other vocabularies whose names data/vocabulary.toml lists."""
 
 
-def word_of(category: str) -> str:
+def word_of(category: str, known: Collection[str]) -> str:
     """Return what the robot calls a category of a service: by its name, else by the vocabulary's class of which it is
-    an alias; a name that the robot has no word for stays as it is."""
+    an alias; a name for which it knows no word stays as it is."""
     name = " ".join(category.replace("_", " ").lower().split())
     classes = (load_vocabulary().by_alias(name, source) for source in ALIASES)
     words = (name, *(entry.name for entry in classes if entry is not None))
-    return next((word for word in words if word in THINGS or word in FURNITURE), name)
+    return next((word for word in words if word in known), name)
 
 
 class AskedSegmenter:
-    """The masks of the service at an address, of colour, depth and the believed pose alone: nothing true.
+    """The masks of the service at an address, of colour, depth and the believed pose alone: nothing true. `known`:
+    words of the robot for categories.
 
     Raises MissingDependency when no service answers, BadInput for something else that answers, or a bad reply;
     MachineFailure when it stops answering.
     """
 
-    def __init__(self, address: str, seed: int) -> None:
+    def __init__(self, address: str, seed: int, known: Collection[str]) -> None:
         self._connection = connect(address)
         self.info = read_info(self._connection)
-        self.missed: set[str] = set()
+        self.missed: frozenset[str] = frozenset()
         """Nobody knows."""
         self._seed, self._asked = seed, 0
         self._categories = {category.id: category for category in self.info.categories}
-        self._words = {category.id: word_of(category.name) for category in self.info.categories}
+        self._words = {category.id: word_of(category.name, known) for category in self.info.categories}
 
     def close(self) -> None:
         """End the connection."""
         self._connection.close()
 
-    def furniture(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
-        """Return the masks that the service names as furniture."""
-        return [entry for entry in self._ask(picture, map_from_camera) if entry.label in FURNITURE]
-
-    def masks(self, picture: Picture, map_from_camera: np.ndarray, view: tuple[object, ...]) -> list[Mask]:
-        """Return the masks of all other things of the service, also those without a word of the robot's."""
-        return [entry for entry in self._ask(picture, map_from_camera) if entry.label not in FURNITURE]
-
-    def _ask(self, picture: Picture, map_from_camera: np.ndarray) -> list[Mask]:
+    def masks(self, picture: Picture, map_from_camera: np.ndarray, region: object) -> list[Mask]:
+        """Return the masks of things of the service. Raises BadInput for a reply that can't be read, MachineFailure
+        when it stops answering."""
         frame = Frame(self._asked, 0.0, picture.color, picture.depth, None, map_from_camera, CAMERA)
         self._asked += 1
         body, content_type = encode_request(SegmentRequest(frame, picture.camera, self._seed), self.info.streams)

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.motion.grasps import Grasp
-
-if TYPE_CHECKING:
-    from scenewright.stages.plan.world_model import WorldModel
 
 DEPTH = 0.024
 """How far the tool point goes below the rim [m]."""
@@ -105,9 +100,3 @@ def askew(across: np.ndarray, outward: np.ndarray) -> float:
     if len(middles) < 3:
         return 0.0
     return float(abs(np.arctan(np.polyfit(middles, farthest, 1)[0])))
-
-
-def has_rim(model: WorldModel, item: str, uncertainty: float) -> bool:
-    """Whether a thing can be lifted by its rim, which may be up to `uncertainty` [m] higher than it looks."""
-    random = np.random.default_rng(0)
-    return bool(rim_grasps(model.points(item), model.pose(item), random, uncertainty=uncertainty))

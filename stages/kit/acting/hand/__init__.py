@@ -1,0 +1,1 @@
+"""What a two-finger hand can take hold of."""
