@@ -21,7 +21,7 @@ class Because(Model):
     shape: str
     """How its surface was found."""
     looks: float
-    """How many frames looked at a spot of it, in the mean."""
+    """How many frames saw it; of long logs, of those that were kept."""
     said: dict[str, float]
     """What masks said most: class -> mean score, 0..1 a look."""
     name: str = ""

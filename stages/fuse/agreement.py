@@ -14,10 +14,11 @@ from scenewright.stages.fuse.belief import doubted, flush_shares
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from scenewright.stages.fuse.layout.evidence import Scene
 from scenewright.stages.fuse.layout.room import CEILING, FLOOR, WALL, Layout, find_layout
+from scenewright.stages.fuse.looks import Looks
 from scenewright.stages.fuse.pieces import Cloud, grown_things, pieces_beside
 from scenewright.stages.fuse.relabelling import relabelled
 from scenewright.stages.fuse.surface import Surface
-from scenewright.stages.fuse.testimony import BOUND, GROWN, PIECE, Reason, carriers_of, with_names
+from scenewright.stages.fuse.testimony import BOUND, GROWN, PIECE, Reason, with_names
 from scenewright.stages.fuse.votes import Votes
 
 SURE = 0.5
@@ -41,6 +42,7 @@ def agreed(
     labelled: LabelledSurface,
     scene: Scene,
     votes: Votes,
+    looks: Looks,
     vocabulary: Vocabulary,
     *,
     voxel: float,
@@ -67,7 +69,7 @@ def agreed(
         instance = np.where(bounded & layout.of(kind), number, instance)
     new_classes = {number: vocabulary.by_name(kind).id for number, kind in bounds.items()}
 
-    shapes, standing = dict.fromkeys(bounds, BOUND), frozenset[int]()
+    shapes = dict.fromkeys(bounds, BOUND)
     if minimum_area > 0:
         stuff = (instance > 0) & ~(is_thing & ~bounded)
         things_of = np.where(stuff, 0, instance)
@@ -81,12 +83,11 @@ def agreed(
         start = first + len(bounds) - 1
         instance = np.where(stuff, instance, np.where(found.piece > 0, start + found.piece, found.thing_of))
         pieces = range(start + 1, start + 1 + int(found.piece.max(initial=0)))
-        standing = frozenset(start + number for number in found.standing)
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
-    carriers = carriers_of(scene.vertices, labels, standing, voxel)
-    named, labels, reasons = with_names(kept, labels, shapes, carriers, votes, vocabulary, things)
+    said = looks.said_of(scene.vertices, labels.instance)
+    named, labels, reasons = with_names(kept, labels, shapes, said, vocabulary, things)
     return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
 
 

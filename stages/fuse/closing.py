@@ -129,6 +129,7 @@ def close_map(mapper: PanopticMapper, vocabulary: Vocabulary, label: str, progre
                 labelled,
                 scene,
                 votes,
+                mapper.looks,
                 vocabulary,
                 voxel=parameters.voxel_size,
                 minimum_area=parameters.unnamed_area,

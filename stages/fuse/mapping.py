@@ -18,6 +18,7 @@ from scenewright.stages.fuse.association import (
 )
 from scenewright.stages.fuse.free_space import FreeSpace
 from scenewright.stages.fuse.integration import integrate
+from scenewright.stages.fuse.looks import Looks
 from scenewright.stages.fuse.merging import Merging, SharedSegment
 from scenewright.stages.fuse.parameters import FuseParameters
 from scenewright.stages.fuse.regularization import MergedLabels
@@ -37,6 +38,7 @@ class PanopticMapper:
         self.seen_in: dict[int, int] = {}
         """Frames in which each instance was predicted, as the bits of an integer."""
         self.free_space = FreeSpace() if parameters.merging == "ours" else None
+        self.looks = Looks(parameters.voxel_size)
         self.cameras: list[np.ndarray] = []
         """Where the camera was at every frame (3,) [m]."""
         self.frames_integrated = 0
@@ -55,7 +57,7 @@ class PanopticMapper:
         It shares the voxel blocks and is good until the next frame.
         """
         mapper = copy(self)
-        mapper.labels, mapper.merging = deepcopy(self.labels), deepcopy(self.merging)
+        mapper.labels, mapper.merging, mapper.looks = deepcopy(self.labels), deepcopy(self.merging), copy(self.looks)
         mapper.sightings, mapper.seen_in = dict(self.sightings), dict(self.seen_in)
         return mapper
 
@@ -148,6 +150,16 @@ class PanopticMapper:
             raise BadInput(
                 f"segment id {unlisted} is in the panoptic image but not in segments.json",
                 hint="run `scenewright segment` again",
+            )
+        if options.merging == "ours":
+            self.looks.add_frame(
+                camera,
+                depth,
+                index_image,
+                segments,
+                world_from_camera,
+                near=options.minimum_depth,
+                far=options.maximum_depth,
             )
         overlap = measure_overlap(
             self.blocks,

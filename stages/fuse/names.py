@@ -1,8 +1,9 @@
 """What a thing is called: by what all looks at it said, and by their silence.
 
-Ours. Each look either names the thing, names it wrongly, or says nothing. How often the masks of this log name things
-says how much their silence means. Rooms hold some things more often than others, and each within a range of sizes:
-that is the prior. The name with the largest posterior is taken if it is likelier than not; else it is an `object`.
+Ours. Each look (looks.py) either names the thing, names it wrongly, or says nothing. How often the masks of this log
+name things says how much their silence means. Rooms hold some things more often than others, and each within a range of
+sizes: that is the prior. The name with the largest posterior is taken if it is likelier than not; else it is an
+`object`.
 A mask that calls a thing a wall, floor or window is silent about which thing it is.
 """
 
@@ -14,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from scenewright.schemas.class_counts import class_counts
 from scenewright.schemas.vocabulary import Vocabulary
-from scenewright.stages.fuse.votes import Votes
 from scenewright.stages.kit.class_extents import LARGEST_EXTENT, SMALLEST_EXTENT, is_plausible
 
 WRONG = 0.05
@@ -46,7 +46,7 @@ class Said:
     """What was said of one thing."""
 
     looks: float
-    """How many frames looked at a spot of it, in the mean."""
+    """In how many of them it was seen."""
     scores: Mapping[int, float]
     """Class -> mean score, 0..1 a look."""
 
@@ -72,18 +72,6 @@ class Naming:
     runners_up: tuple[tuple[int, float], ...]
     """The next two classes with their posteriors."""
     rule: str
-
-
-def said_of(segments: np.ndarray, votes: Votes, others: frozenset[int] = frozenset()) -> Said:
-    """Return what was said of surface of these segment labels (N,); what was said of labels of `others` is theirs."""
-    labels, counts = np.unique(segments, return_counts=True)
-    looks, scores = 0.0, dict[int, float]()
-    for label, share in zip(labels.tolist(), (counts / max(1, counts.sum())).tolist(), strict=True):
-        seen = votes.looks.get(label, 0)
-        looks += share * seen
-        for c, score in () if label in others else votes.scores.get(label, {}).items():
-            scores[c] = scores.get(c, 0.0) + share * min(score / max(seen, 1), 1.0)
-    return Said(looks, scores)
 
 
 def rates_of(things: Sequence[Said], classes: frozenset[int]) -> Rates:

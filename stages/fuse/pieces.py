@@ -83,8 +83,6 @@ class Pieces:
     """(V,) int32: from 1 in the order of size, 0 of no piece."""
     thing_of: np.ndarray
     """(V,) int32: the thing of masks that each other vertex is of, 0 none."""
-    standing: frozenset[int]
-    """Pieces that stand on a level top."""
 
 
 class Footprint:
@@ -232,14 +230,12 @@ def pieces_of(cloud: Cloud, free: np.ndarray, minimum_area: float) -> np.ndarray
     parts, standing, cut_from = cut_parts(cloud, parts)
     standing |= _on_tops(cloud, parts, 0)
     joined = join_parts(cloud, parts, standing, cut_from, minimum_area)
-    return numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area)[0]
+    return numbered_pieces(cloud, joined, standing | set(cut_from), minimum_area)
 
 
-def numbered_pieces(
-    cloud: Cloud, parts: np.ndarray, cut: Collection[int], minimum_area: float
-) -> tuple[np.ndarray, list[int]]:
-    """Return the parts (V,) that are large enough to be pieces, as in `pieces_of`, and the part of each; those that are
-    `cut` from others may be small."""
+def numbered_pieces(cloud: Cloud, parts: np.ndarray, cut: Collection[int], minimum_area: float) -> np.ndarray:
+    """Return the parts (V,) that are large enough to be pieces, as in `pieces_of`; those that are `cut` from
+    others may be small."""
     pieces = []
     for part in np.unique(parts[parts >= 0]):
         own = np.flatnonzero(parts == part)
@@ -251,7 +247,7 @@ def numbered_pieces(
     ordered = sorted(pieces, key=lambda own: (-len(own), own[0]))
     for number, own in enumerate(ordered, 1):
         piece[own] = number
-    return piece, [int(parts[own[0]]) for own in ordered]
+    return piece
 
 
 def _tops(cloud: Cloud, parts: np.ndarray) -> list[_Top]:
@@ -353,8 +349,7 @@ def pieces_beside(
             thing_of[own], cut[own] = host, -1
     cut = np.where(cut < first, -1, cut)
     joined = join_parts(cloud, cut, standing, cut_from, minimum_area)
-    piece, part_of = numbered_pieces(cloud, joined, standing | set(cut_from) | apart, minimum_area)
-    return Pieces(piece, thing_of, frozenset(k for k, part in enumerate(part_of, 1) if part in standing))
+    return Pieces(numbered_pieces(cloud, joined, standing | set(cut_from) | apart, minimum_area), thing_of)
 
 
 def _touching(cloud: Cloud, own: np.ndarray, free: np.ndarray, parts: np.ndarray) -> int:

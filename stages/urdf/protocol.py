@@ -132,11 +132,17 @@ def _names(folder: Path) -> list[str]:
 def _in_mujoco(scene: MujocoScene) -> tuple[BodyMotion, ...]:
     """Return what becomes of the bodies, with the margins of what is near a limit: the whole scene is let go again,
     from poses a tenth of a millimetre off."""
-    bodies = let_go(scene, SECONDS, **LIMITS)
+    bodies = let_go(scene, SECONDS, moved_limit=MOVED_LIMIT, turned_limit=TURNED)
     if not any(map(body_is_near, bodies)):
         return bodies
     random = np.random.default_rng(0)
-    runs = [{body.name: body for body in let_go(scene, SECONDS, **LIMITS, random=random)} for _ in range(RUNS)]
+    runs = [
+        {
+            body.name: body
+            for body in let_go(scene, SECONDS, moved_limit=MOVED_LIMIT, turned_limit=TURNED, random=random)
+        }
+        for _ in range(RUNS)
+    ]
     return tuple(
         replace(body, margin=body_margin(body, [(run[body.name].moved, run[body.name].turned) for run in runs]))
         if body_is_near(body)

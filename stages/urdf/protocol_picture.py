@@ -32,7 +32,8 @@ def draw_protocol(path: Path, folder: Path, document: dict[str, Any]) -> None:
         figure, all_axes = plt.subplots(1, 2, figsize=(12.0, 6.0))
         for axes, (title, shown, along) in zip(all_axes, VIEWS, strict=True):
             axes.set_title(title)
-            for body in sorted(things, key=lambda body: (_extreme(body, along), body.name)):
+            # what is fixed, as a cabinet to the ceiling, must not hide what is judged
+            for body in sorted(things, key=lambda body: (body.name in fates, _extreme(body, along), body.name)):
                 _draw(axes, body, shown, COLORS[fates.get(body.name, "fixed")], named=body.name in fates)
             _mark_pairs(axes, bodies, document, shown)
             corners = np.concatenate([box_corners(body.box) for body in things])[:, shown]

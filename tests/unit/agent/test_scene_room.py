@@ -221,7 +221,9 @@ def truth_of_room(folder: Path, digest: str) -> GroundTruth:
 def test_a_task_in_words_is_done_among_library_furniture_and_again_from_its_episode(tmp_path: Path) -> None:
     write_room(tmp_path / "truth" / "room")
     truth, other = (truth_of_room(tmp_path / "truth", digest) for digest in ("1" * 64, "2" * 64))
-    parameters = RunParameters(task="put the cup on the table", simulation="physics", image_width=300)
+    parameters = RunParameters(
+        task="put the cup on the table", simulation="physics", image_width=300, failures=0.0, perception=0.0
+    )
     made = run_step(None, None, truth, None, parameters=parameters, context=context(tmp_path / "made", 4))
     assert made.outcome == "ok" and made.info.score.success and made.info.room == "1" * 64
     assert "open(rooms['cabinet_0'])" in "\n".join(turn.code for turn in made.info.turns), "the cup was in a drawer"

@@ -12,6 +12,7 @@ from scenewright.stages.fuse.agreement import SURE, Agreement, agreed
 from scenewright.stages.fuse.closing import told
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from scenewright.stages.fuse.layout.evidence import Scene
+from scenewright.stages.fuse.looks import Look, Looks
 from scenewright.stages.fuse.relabelling import relabelled
 from scenewright.stages.fuse.surface import Surface
 from scenewright.stages.fuse.testimony import BOUND, BY_MASKS, BY_MOST_LOOKS, GROWN, PIECE
@@ -26,7 +27,7 @@ VOCABULARY = load_vocabulary()
 FLOOR, WALL, CHAIR, CABINET, MONITOR, DOOR, OBJECT = (
     class_id(name) for name in ("floor", "wall", "chair", "cabinet", "monitor", "door", "object")
 )
-LOOKS = 20
+LOOKS, VOXEL = 20, 0.02
 CHAIR_AT, COUNTER, ON_IT = (
     ((-1.2, -1.0, 0.0), (-0.7, -0.5, 0.8)),
     ((0.0, 1.4, 0.0), (1.5, 1.98, 0.9)),
@@ -86,8 +87,30 @@ class Masks:
             None,
         )
         return agreed(
-            self.surface(), self.entities(), labelled, scene, votes, VOCABULARY, voxel=0.02, minimum_area=minimum_area
+            self.surface(),
+            self.entities(),
+            labelled,
+            scene,
+            votes,
+            self.looks(),
+            VOCABULARY,
+            voxel=VOXEL,
+            minimum_area=minimum_area,
         )
+
+    def looks(self) -> Looks:
+        """Looks from nowhere, each at all of it, in which every mask has its share."""
+        cells, looks = np.floor(self.vertices / VOXEL).astype(np.int32), Looks(VOXEL)
+        for number in range(LOOKS):
+            mask, said = np.zeros(len(cells), np.uint16), list[tuple[int, float]]()
+            for where, _, scores in self.of.values():
+                starts = np.cumsum([0.0, *scores.values()])
+                for class_name, start, end in zip(scores, starts[:-1], starts[1:], strict=True):
+                    if round(LOOKS * start) <= number < round(LOOKS * end):
+                        said.append((class_name, 1.0))
+                        mask[where] = len(said)
+            looks.kept += (Look(cells, mask, tuple(said)),)
+        return looks
 
 
 def check_whole(found: Agreement) -> dict[int, str]:

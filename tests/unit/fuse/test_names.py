@@ -20,9 +20,7 @@ from scenewright.stages.fuse.names import (
     name_of,
     prior_odds,
     rates_of,
-    said_of,
 )
-from scenewright.stages.fuse.votes import Votes
 
 from tests.unit.fuse.scenes import class_id
 
@@ -39,24 +37,6 @@ def chance(naming: Naming, class_name: int) -> float:
     """Posterior of a class; 0 where it is not among those that are told."""
     rows = [(naming.class_id, naming.posterior), *naming.runners_up]
     return dict(rows).get(class_name, 0.0)
-
-
-def test_what_was_said_is_the_mean_over_surface_and_looks() -> None:
-    votes = Votes({1: {CHAIR: 2.0, WALL: 1.0}, 2: {CHAIR: 1.0}}, {1: 4, 2: 2, 9: 5})
-    said = said_of(np.array([1, 1, 1, 2, 9, 9]), votes)
-    assert said.scores == {CHAIR: pytest.approx(0.5 * 0.5 + 0.5 / 6), WALL: pytest.approx(0.125)}
-    assert said.looks == pytest.approx(0.5 * 4 + 2 / 6 + 5 / 3)
-    assert said_of(np.array([1, 1, 1, 2, 9, 9]), votes, frozenset({1})).scores == {CHAIR: pytest.approx(0.5 / 6)}
-    assert said_of(np.zeros(0, int), votes) == Said(0.0, {})
-
-
-def test_a_share_is_that_of_the_looks_and_no_more_than_all() -> None:
-    votes = Votes({1: {CHAIR: 3.0, TABLE: 1.0}, 2: {CHAIR: 9.0}}, {1: 4, 2: 5})
-    segments = np.array([1, 2, 7])
-    assert votes.share(segments, [CHAIR]).tolist() == [0.75, 1.0, 0.0]
-    assert votes.share(segments, [CHAIR, TABLE]).tolist() == [1.0, 1.0, 0.0]
-    assert votes.own_share(segments, np.array([TABLE, CHAIR, 0])).tolist() == [0.25, 1.0, 0.0]
-    assert votes.share(np.zeros(0, int), [CHAIR]).shape == (0,)
 
 
 def test_a_name_that_most_looks_gave() -> None:

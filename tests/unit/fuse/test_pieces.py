@@ -196,7 +196,7 @@ def test_small_and_empty() -> None:
     nothing = Cloud(np.zeros((0, 3)), np.zeros((0, 3)), VOXEL)
     assert pieces_of(nothing, np.zeros(0, bool), 0.1).shape == (0,)
     found = pieces_beside(nothing, np.zeros(0, np.int32), np.zeros(0, bool), np.zeros(0), 0.1)
-    assert found.piece.shape == found.thing_of.shape == (0,) and not found.standing
+    assert found.piece.shape == found.thing_of.shape == (0,)
 
 
 def test_a_footprint_surrounds_what_hides_it() -> None:

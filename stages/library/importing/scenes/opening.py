@@ -58,6 +58,7 @@ def opened_scene(path: Path, root: Path | None = None) -> Iterator[OpenedScene]:
         return
     if not path.is_file():
         raise BadInput(f"{path}: there is no such file or folder", hint=WHAT_IS_READ)
+    read: Callable[[Path, Path], OthersScene]
     if path.suffix.lower() in USD:
         read = usd_scene
     else:

@@ -109,6 +109,7 @@ def _record(body: OthersBody, scene: OthersScene, values: dict[str, float]) -> S
         joint_values={joint.name: values[joint.name] for joint in body.joints},
         box=box_from_bounds(placed.min(axis=0), placed.max(axis=0)),
         mass=sum(link.inertial.mass for link in body.links if link.inertial is not None),
+        world_from_reconstructed=None,
     )
 
 
