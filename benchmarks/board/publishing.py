@@ -37,9 +37,11 @@ ABOUT = {
     "rates on real frames; in `everything` depth bends, poses are estimated, the library lacks the rooms' styles and "
     "sizes are wrong by up to a fifth. Real logs are recorded",
     "knows": "Frames, masks, a library",
-    "does_not_show": "How it works with a detector's own masks in a room that people live in: the errors of the masks "
-    "have the rates of real ones, not their shapes. Long walks and large pictures: forty frames of 320 x 240 a room. "
-    "Public rooms have been seen; sealed ones are of the same six recipes.",
+    "does_not_show": (
+        "A detector's own masks in a room that people live in: errors of the masks have the rates of real "
+        "ones, not their shapes. Long walks and large pictures: a room has forty frames of 320 x 240. Public "
+        "rooms have been seen; sealed ones follow the same six recipes."
+    ),
 }
 SHOWN_OVER_VERSIONS = {
     "pq": "panoptic quality",

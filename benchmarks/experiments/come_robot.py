@@ -183,12 +183,16 @@ MEASURES = {
 EXPERIMENT = Experiment(
     name="come_robot",
     title="A mobile manipulator told in words (COME-robot)",
-    simulated="Apartments, cameras, base and arm without contact; failures at the rates of the thesis's failure table, "
-    "by causes that persist; brains are rules, no language model is asked.",
+    simulated=(
+        "Apartments, cameras, base and arm without contact. Failures come at the rates of the thesis's "
+        "failure table, by causes that persist. Brains are rules; no language model is asked."
+    ),
     knows="What its cameras and joints tell through one interface; only `oracle` sees without errors.",
-    does_not_show="How often a real robot succeeds, or how good a language model is: causes and their rates are ours, "
-    "set after a table that does not say what its counts are of, and every arm has the same brain of rules, which "
-    "knows these tasks' words. There is no physics and no picture.",
+    does_not_show=(
+        "How often a real robot succeeds, or how good a language model is. Causes and rates of failures are "
+        "ours, after a table that does not say what it counts. Every arm has the same brain of rules, which "
+        "knows these tasks' words. There is no physics and no picture."
+    ),
     arms={arm: arm for arm in ARMS},
     cases=(*FAST, MIXED, *CURVES),
     runs=runs,

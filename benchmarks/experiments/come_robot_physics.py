@@ -47,13 +47,17 @@ def more_figures(results: Results) -> Mapping[str, float | Figure | None]:
 EXPERIMENT = Experiment(
     name="come_robot_physics",
     title="A mobile manipulator told in words, with physics",
-    simulated="Apartments, robot and things in pybullet; two rendered RGB-D cameras with the noise model; masks out of "
-    "the renderer with persistent errors at the rates of the thesis's failure table; an imperfect localisation and "
-    "encoders; brains are rules, no language model is asked.",
+    simulated=(
+        "Apartments, robot and things in pybullet; two rendered RGB-D cameras with noise; localisation and "
+        "encoders err. Masks are the renderer's, with persistent errors at the rates of the thesis's failure "
+        "table. Brains are rules; no language model is asked."
+    ),
     knows="What its cameras and joints tell through one interface; only `oracle` gets masks without errors.",
-    does_not_show="How often a real robot succeeds, or how good a language model is: things are simple shapes, masks "
-    "are no network's, which way a door moves is assumed by the class of its furniture, and every arm has the same "
-    "brain of rules, which knows these tasks' words.",
+    does_not_show=(
+        "How often a real robot succeeds, or how good a language model is. Things are simple shapes and masks "
+        "are no network's. How a door moves is assumed by the class of its furniture. Every arm has the same "
+        "brain of rules, which knows these tasks' words."
+    ),
     arms={arm: arm for arm in ARMS},
     cases=CASES,
     tuning=tuple(map(str, TUNING)),

@@ -71,8 +71,10 @@ def poured(fragments: Sequence[Body], random: np.random.Generator) -> list[Body]
 EXPERIMENT = Experiment(
     name="cutting_touching",
     title="Fragments seen that lie near to each other",
-    simulated="Foods cut by the scripted cutter, laid in rows or poured onto the board in physics (by convex hulls, "
-    "for three quarters of a second), and depth pictures with the kit's noise.",
+    simulated=(
+        "Foods cut by the scripted cutter, laid in rows or poured onto the board in physics (convex hulls, "
+        "three quarters of a second); depth pictures with the kit's noise."
+    ),
     knows="Nothing but the depth pictures and where the cameras stand.",
     does_not_show="Real cameras; fragments that stick to each other.",
     arms=ARMS,

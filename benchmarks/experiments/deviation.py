@@ -189,8 +189,10 @@ EXPERIMENT = Experiment(
     title="Depth from two eyes, weighed by its own deviation",
     simulated="Generated rooms, two rendered eyes with noisy pictures. The motorcycle is a real pair.",
     knows="Exact poses and calibration.",
-    does_not_show="Real rooms: no real log with deviations and a true surface was at hand, of phones neither. The pair "
-    "has measured disparities and no other views, so that nothing is fused of it.",
+    does_not_show=(
+        "Real rooms, or phones: no log with deviations and a true surface was at hand. The pair has no other "
+        "views, so nothing is fused of it."
+    ),
     arms={"weighed": "weighed by deviation", "even": "without deviations", "strict": "without, confidence from 0.5"},
     cases=(ROOMS, REAL),
     runs=lambda arm, case: arm == "weighed" or case == ROOMS,

@@ -130,9 +130,11 @@ MEASURES: dict[str, Measure] = {
 EXPERIMENT = Experiment(
     name="edits_effort",
     title="What it takes to put a room right by hand",
-    simulated="Generated rooms: walks, pictures, noisy depth, errors of true masks. The logs are recordings. The edits "
-    "are made by a script that knows the truth, through what the page talks to; minutes are those of the "
-    "keystroke-level model.",
+    simulated=(
+        "Generated rooms: walks, pictures, noisy depth, errors of true masks; logs are recordings. A script "
+        "that knows the truth makes the edits through the page's interface. Minutes are the keystroke-level "
+        "model's."
+    ),
     knows="Everything: it stands in for somebody who was in the room.",
     does_not_show="How long people take and what they overlook; of recordings what nobody annotated.",
     arms={"script": "a script at the desk"},

@@ -405,11 +405,15 @@ CASES = tuple(f"{domain}/{which}" for domain in DOMAINS for which in SETS)
 EXPERIMENT = Experiment(
     name="interpret",
     title="What words mean, learned from corrections (InterPreT)",
-    simulated="The kitchen (planar rigid bodies and drops of water), and the teacher, who answers by the truth in "
-    "sentences of a template; training tasks and tests are drawn by us after the goal groups of the thesis, whose own "
-    "tests are not public here. No language model is asked.",
-    knows="What perception calls say, the teacher's sentences, a word list written by hand, the thesis's worked "
-    "example (in_gripper, with its tolerance) and three relations of boxes.",
+    simulated=(
+        "The kitchen (planar rigid bodies, drops of water), and a teacher who answers by the truth in "
+        "template sentences. Tasks are drawn after the thesis's goal groups, whose own tests are not public "
+        "here. No language model is asked."
+    ),
+    knows=(
+        "What perception calls say, the teacher's sentences, a hand-written word list, the thesis's worked "
+        "example (in_gripper, with its tolerance) and three relations of boxes."
+    ),
     does_not_show="How a language model or a person would do: the word list knows these sentences' words, and most "
     "true meanings are a word or two of the grammar. The thesis's arm was run with a stand-in that guesses by the word "
     "list, no language model; Code-as-Policies and Inner Monologue were not run. The kitchen's grasps never slip.",

@@ -342,11 +342,15 @@ def together(trial: Trial) -> object:
 EXPERIMENT = Experiment(
     name="legs",
     title="Rooms as Gaussians, learned while pictures arrive",
-    simulated="The generated rooms, their pictures and noisy depth; the drift of poses; the clock, which counts "
-    "processor time of one thread beside the stamps of the log.",
+    simulated=(
+        "The generated rooms, their pictures and noisy depth; the drift of poses; the clock, which is "
+        "processor time of one thread beside the log's stamps."
+    ),
     knows="Colour, depth, calibration and poses (exact, given, or drifting) of every picture that has arrived.",
-    does_not_show="Language: nothing is asked. A GPU, on which the thesis's method and LERF make far more steps in the "
-    "same time. Budgets that stand in no row.",
+    does_not_show=(
+        "Language: nothing is asked. A GPU, on which the thesis's method and LERF make far more steps in the "
+        "same time. Other budgets."
+    ),
     arms={"ours": "ours", "thesis": "thesis's method", "lerf": "LERF"},
     runs=lambda arm, case: arm != "lerf" or case.split("/")[1] in BUDGETS,
     cases=(*cases_of((*BUDGETS, *POSES)), *OTHERS),

@@ -288,8 +288,10 @@ EXPERIMENT = Experiment(
     title="Rooms that are asked",
     simulated="The rooms, their pictures and noisy depth; the map of `entities`: the true surface that was seen.",
     knows="Colour, depth and exact poses. `thesis`, `langsplat`, `lerf` are given the view that shows it best.",
-    does_not_show="CLIP, SigLIP: the encoder is ours, small, trained on other generated rooms of the same makers. SAM, "
-    "whose segments LangSplat has. Words that people choose: they are of the encoder's own.",
+    does_not_show=(
+        "CLIP or SigLIP: the encoder is ours, small, trained on other rooms of the same generators. SAM, "
+        "whose segments LangSplat uses. Words that people choose: these are the encoder's own."
+    ),
     arms={
         "ours": "ours",
         "pieces": "ours without a map",

@@ -249,8 +249,10 @@ def pooled(name: str, unit: str, percentile: float, factor: float = 1.0) -> Meas
 EXPERIMENT = Experiment(
     name="moving",
     title="Doors and drawers seen to move",
-    simulated="Generated rooms, a structured-light camera's noise, quantisation and dropouts; things are opened or "
-    "shut between two halves of the walk, while nobody looks.",
+    simulated=(
+        "Generated rooms, a structured-light camera's noise, quantisation and dropouts; things are opened or "
+        "shut between the two halves of the walk."
+    ),
     knows="Exact poses and intrinsics; no masks, no classes, no models.",
     does_not_show="Real logs: none that we have shows a thing in two states. Nor poses with errors, a hand or a person "
     "in the picture, things opened while the camera looks, sliding doors, lids and flaps.",

@@ -233,11 +233,12 @@ EXPERIMENT = Experiment(
     simulated="Needle, thread, drivers, pad, highlights and blood are rendered; masks are the network's, or made of "
     "what is no needle; `endoscope` is recorded, and so are `pairs`, but for the right eye of tables and rooms.",
     knows="The needle's radius; the rig; no disparity is given.",
-    does_not_show="Needles in real pictures: there are none to be had. Highlights and blood are of the kind that the "
-    "network was trained with, drawn by other code in the same rendered world, in which the test of presence was "
-    "fitted too, cloth and instruments by the code that drew its tuning views, five pictures of them over one scene. "
-    "Of real wounds there is one recording. That none of the drapes be answered, and nine of ten visible needles, the "
-    "aims, is missed.",
+    does_not_show=(
+        "Needles in real pictures: there are none. Highlights, blood, cloth and instruments are rendered in "
+        "the world in which network and test of presence were tuned; five pictures show one scene. Of real "
+        "wounds there is one recording. The aims (no drape answered, nine of ten visible needles answered) "
+        "are missed."
+    ),
     arms={"ours": "ours"},
     cases=(*VIEWS, RECORDED, PAIRS),
     seeds_of=seeds_of,

@@ -132,12 +132,16 @@ def rate(records: Sequence[Lines]) -> float | None:
 EXPERIMENT = Experiment(
     name="stitch_follow",
     title="A needle followed from pair to pair",
-    simulated="Needle, thread, drivers and pad before an endoscope, 1280 x 960 pixels; the needle moves by a few "
-    "millimetres and degrees from pair to pair.",
+    simulated=(
+        "Needle, thread, drivers and pad before an endoscope, 1280 x 960 pixels; from pair to pair the needle "
+        "moves by a few millimetres and degrees."
+    ),
     knows="The needle's radius and its taper, which is the renderer's own; most of the calibration; masks are the "
     "network's, or true ones.",
-    does_not_show="Anything about real pictures; a needle that goes far between two pairs; a second needle that comes "
-    "into the picture while the first is followed. Times are of a busy machine.",
+    does_not_show=(
+        "Real pictures; a needle that moves far between two pairs; a second needle that appears while the "
+        "first is followed. Times are of a busy machine."
+    ),
     arms={"ours": "ours", OWN: "masks of one's own", WHOLE: "all of every picture"},
     cases=("endoscope",),
     tuning=tuple(map(str, TUNING)),

@@ -133,8 +133,7 @@ EXPERIMENT = Experiment(
     title="A needle of which less is known",
     simulated="Needle, thread, drivers and pad are rendered; masks are the network's.",
     knows="The rig and the needle's taper; its radius but for the arms that are told another, or none.",
-    does_not_show="Needles in real pictures: there are none to be had. A tip that is painted over has nothing "
-    "before it.",
+    does_not_show="Needles in real pictures: there are none. A painted-over tip has nothing before it.",
     arms={name: title for name, (title, _) in ARMS.items()},
     cases=(CASE,),
     tuning=TUNING,

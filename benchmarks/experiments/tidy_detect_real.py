@@ -346,12 +346,16 @@ EXPERIMENT = Experiment(
     name="tidy_detect_real",
     title="Vision of tableware on real images",
     simulated="Nothing: nine RealSense frames, twelve photographs.",
-    knows="Intrinsics and depth; the standard dish sizes, or none; the limits of `left out` are chosen on the other "
-    "scenes; developed on these frames.",
-    does_not_show="A clean test: `--sizes estimated` was developed while looking at these nine frames of six scenes, "
-    "and the truth was marked by eye; `left out` chooses its limits on the other scenes alone, not its method. No "
-    "utensil is in them. Nothing is stacked from estimated sizes, so that no stacking plan can be wrong, and none can "
-    "be made. Known sizes are the standard ones, which these dishes do not have.",
+    knows=(
+        "Intrinsics and depth; the standard dish sizes, or none. The limits of `left out` are chosen on the "
+        "other scenes. Developed on these frames."
+    ),
+    does_not_show=(
+        "A clean test: `--sizes estimated` was developed on these nine frames of six scenes, and the truth "
+        "was marked by eye. `left out` chooses its limits on the other scenes, not its method. There is no "
+        "utensil. Nothing is stacked from estimated sizes. Known sizes are the standard ones, which these "
+        "dishes do not have."
+    ),
     arms={"ours": "ours"},
     cases=(*SIZES, *GAINS),
     seeds_of=seeds_of,

@@ -185,8 +185,10 @@ EXPERIMENT = Experiment(
     title="Clearing tables in physics",
     simulated="An arm with friction grasps, forces within a 2F-85's data sheet; images are rendered.",
     knows="By truth, what stands where; through images, what `detect` finds with known sizes.",
-    does_not_show="A real arm or table. Rules were tuned in the same physics, and times of actions fitted there on "
-    "tuning seeds. Of few tables one failure cannot be told from none.",
+    does_not_show=(
+        "A real arm or table. Rules were tuned in the same physics; times of actions were fitted there on "
+        "tuning seeds. With few tables one failure cannot be told from none."
+    ),
     arms={arm: arm for arm in ("random", "pull", "stack", *OURS, FAR_ARM)},
     cases=CASES,
     default_arms=lambda bench: ("random", "pull", "stack", "ours", FAR_ARM),

@@ -113,11 +113,13 @@ EXPERIMENT = Experiment(
     name="tidy_wrong",
     title="Clearing tables with wrong times and chances",
     simulated="Times and slips of actions, fitted to the thesis; no sight, no physics.",
-    knows="The whole table; times or chances that are off by three tenths, but for `ours`, which knows those it is "
-    "judged by.",
-    does_not_show="What an arm does; errors of more than that, or of what a plan does not reckon with at all. Where "
-    "trips are wrong one way and stackings and pulls the other, that is more than the range in which ours "
-    "looks for the least regret.",
+    knows=(
+        "The whole table; times or chances are off by three tenths, but for `ours`, which knows those that judge it."
+    ),
+    does_not_show=(
+        "What an arm does; larger errors, or errors that a plan does not model. Trips wrong one way with "
+        "stackings and pulls wrong the other are outside the range in which ours seeks the least regret."
+    ),
     arms={arm: arm for arm in (*BELIEFS, "pull", "stack")},
     cases=tuple(f"{tier}/delay{delay}" for tier in ("tier1", "tier2") for delay in DELAYS),
     tuning=tuple(map(str, TUNING)),

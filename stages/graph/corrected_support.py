@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 from scenewright.schemas.scene_parts import Box
+from scenewright.stages.graph.enclosing import encloses
 from scenewright.stages.graph.nodes import SAME_HEIGHT, Entity, level_patch
 from scenewright.stages.graph.parameters import GraphParameters
 from scenewright.stages.graph.support import (
@@ -84,6 +85,11 @@ def candidates_for(child: Entity, entities: list[Entity], parameters: GraphParam
     return prefer_contact(prefer_the_highest(best_first(candidates, entities), parameters))
 
 
+def holds(parent: Entity, child: Entity) -> bool:
+    """Whether things are in the parent rather than on it: by its class; of what nobody named, by its surface."""
+    return parent.is_container or (parent.class_name == NAMELESS and encloses(parent, child))
+
+
 def seen_candidate(child: Entity, parent: Entity, k: int, parameters: GraphParameters) -> Candidate | None:
     """Return the relation over the parent's patch `k`, or None."""
     patch = parent.patches[k]
@@ -100,7 +106,7 @@ def seen_candidate(child: Entity, parent: Entity, k: int, parameters: GraphParam
         return None
     if parent.class_name != "floor" and gap > HIGHEST_FOOT:
         return None
-    inside = stands_inside(child, parent, height)
+    inside = stands_inside(child, parent, height, container=holds(parent, child))
     least = parameters.area_threshold
     overlap = effective = hull_overlap(patch.hull, child.box)
     if parent.class_name == "floor":
@@ -149,7 +155,10 @@ def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters)
     if len(outline) < 3:
         return None
     height = child.bottom
-    inside = stands_inside(child, parent, height) and height >= parent.bottom - ORDER_TOLERANCE
+    inside = (
+        stands_inside(child, parent, height, container=holds(parent, child))
+        and height >= parent.bottom - ORDER_TOLERANCE
+    )
     if child.class_name in parameters.wall_classes and not inside:
         return None
     if inside:

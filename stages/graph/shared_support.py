@@ -50,7 +50,7 @@ def partial_supports(child: Entity, entities: list[Entity], parameters: GraphPar
             if abs(height - parent.top) <= SAME_LEVEL:
                 # What lies on a top hides it.
                 share = max(share, inside_share(child.box, parent.box))
-            if share < PART_SHARE or stands_inside(child, parent, height):
+            if share < PART_SHARE or stands_inside(child, parent, height, container=parent.is_container):
                 continue
             if parent.name not in best or share > best[parent.name].share:
                 best[parent.name] = PartialSupport(parent.name, k, gap, share, height)

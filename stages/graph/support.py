@@ -57,10 +57,10 @@ def inside_share(child: Box, container: Box) -> float:
     return footprint_overlap(child, container) / area if area > 0.0 else 0.0
 
 
-def stands_inside(child: Entity, parent: Entity, height: float) -> bool:
-    """Whether the child stands within a container: on an inner plane at `height`, top below the container's top."""
+def stands_inside(child: Entity, parent: Entity, height: float, *, container: bool) -> bool:
+    """Whether the child stands within a `container`: on an inner plane at `height`, top below the container's top."""
     return (
-        parent.is_container
+        container
         and child.top <= parent.top + SAME_TOP
         and height < parent.top - SAME_TOP
         and inside_share(child.box, parent.box) >= INSIDE_SHARE

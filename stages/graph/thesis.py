@@ -112,7 +112,9 @@ def seen_candidate(child: Entity, parent: Entity, k: int, parameters: GraphParam
     score = support_score(gap, overlap)
     if overlap < parameters.area_threshold or score < parameters.minimum_score:
         return None
-    relation: Literal["supports", "contains"] = "contains" if stands_inside(child, parent, height) else "supports"
+    relation: Literal["supports", "contains"] = (
+        "contains" if stands_inside(child, parent, height, container=parent.is_container) else "supports"
+    )
     return Candidate(child.name, parent.name, score, relation, gap, overlap, height, k)
 
 
@@ -130,7 +132,10 @@ def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters)
     if score < parameters.minimum_score:
         return None
     height = child.bottom
-    inside = stands_inside(child, parent, height) and height >= parent.bottom - ORDER_TOLERANCE
+    inside = (
+        stands_inside(child, parent, height, container=parent.is_container)
+        and height >= parent.bottom - ORDER_TOLERANCE
+    )
     relation: Literal["supports", "contains"] = "contains" if inside else "supports"
     patch = level_patch(outline, height, hidden=True)
     return Candidate(child.name, parent.name, score, relation, 0.0, share, height, None, patch)

@@ -117,11 +117,15 @@ def printed(results: Results) -> str:
 EXPERIMENT = Experiment(
     name="cutting",
     title="Cutting towards goals that were cut by somebody else",
-    simulated="Foods, planes, and the cutter who demonstrates and who cuts the goals; fragments are cut exactly and "
-    "pushed apart, without physics. For `ours_perceived` they are laid apart on a board in physics, and two depth "
-    "cameras with noise are rendered.",
-    knows="Every fragment's whole shape, but `ours_perceived` only what its cameras see; the goal's fragments as "
-    "bodies; `scatter` also knows the recipe after which the goal was cut.",
+    simulated=(
+        "Foods, planes, and the cutter who demonstrates and cuts the goals. Fragments are cut exactly and "
+        "pushed apart, without physics. For `ours_perceived` physics lays them on a board, and two noisy "
+        "depth cameras are rendered."
+    ),
+    knows=(
+        "Every fragment's whole shape; `ours_perceived` only what its cameras see; the goal's fragments as "
+        "bodies. `scatter` also knows the recipe of the goal."
+    ),
     does_not_show="What people would do: `scatter` is a script that misses by chance. No real camera.",
     arms=ARMS,
     cases=(*CELLS, *GROWTH),

@@ -109,10 +109,11 @@ EXPERIMENT = Experiment(
     title="Real rooms by a painted surface, beside boxes",
     simulated="Nothing: two recorded logs, judged by what one person painted in some of their frames.",
     knows="The detector, the log; the painted masks, all that is judged.",
-    does_not_show="A room that nobody looked at: rules and thresholds of the map were chosen on both logs. What was "
-    "painted is one person's, to some five pixels, in a part of the frames; what no painted frame sees, and what "
-    "has no outline, counts for nothing. All that is painted comes from one hand: figures of painted masks are a "
-    "ceiling and no result, also where masks and truth are of different frames.",
+    does_not_show=(
+        "A room nobody looked at: rules and thresholds were chosen on both logs. One person painted part of "
+        "the frames, to some five pixels; what is not painted counts for nothing. Figures of painted masks "
+        "are a ceiling, also where masks and truth are of different frames."
+    ),
     arms={
         "detector": "a small detector's boxes",
         "painted": "the painted surface",

@@ -125,9 +125,11 @@ EXPERIMENT = Experiment(
     title="The needle's pose",
     simulated="Needle, thread, drivers, pad; masks are spoiled true ones, disparity is true with noise.",
     knows="The needle's radius and its taper, which is the renderer's own but in `ground`; most of the calibration.",
-    does_not_show="Anything about real needles: no real picture of one was to be had. Masks are true ones that were "
-    "spoiled; from the network's masks less is right. A needle that is not the known one is placed worse by ours, and "
-    "a wrong pose may then be answered. Weights of the evidence fit these masks.",
+    does_not_show=(
+        "Real needles: there was no real picture. Masks are spoiled true ones; the network's give less. Other "
+        "needles than the known one are placed worse by ours, and a wrong pose may be answered. Weights of "
+        "the evidence fit these masks."
+    ),
     arms={"thesis": "thesis", "ours": "ours"},
     cases=tuple(CASES),
     tuning=tuple(map(str, TUNING)),

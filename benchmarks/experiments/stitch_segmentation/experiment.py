@@ -300,9 +300,11 @@ EXPERIMENT = Experiment(
     title="Needle and thread in a picture",
     simulated="Pairs of the one rendered world the network was trained on; disparity is true with noise.",
     knows="The picture; for the pose the needle's taper, and its radius but for the arm that fits it.",
-    does_not_show="Anything about real pictures: it has seen one rendered world, one pad, one needle, one kind of "
-    "driver, and was trained once. Disparity is no matcher's. A needle of another radius: the fitted radius is that of "
-    "the usual needle. The aim for needles not near edge-on is missed by far.",
+    does_not_show=(
+        "Real pictures: the network has seen one rendered world, one pad, one needle, one kind of driver, and "
+        "was trained once. Disparity is no matcher's. Needles of another radius: the fitted radius is the "
+        "usual needle's. The aim for needles not near edge-on is missed by far."
+    ),
     arms={name: name for name in (NETWORK, *(f"{arm}_{masks}" for masks in MASKS for arm in ESTIMATORS), FITTED)},
     cases=(VIEWS,),
     tuning=tuple(map(str, TUNING)),

@@ -107,9 +107,10 @@ EXPERIMENT = Experiment(
     title="The thread as a curve in space",
     simulated="Pairs of the one rendered world the network was trained on.",
     knows="The needle's true swage as the start; true masks or the network's.",
-    does_not_show="Anything about real thread; the thesis gives no figures to compare with. The true end of the needle "
-    "is given as the start, which a needle with its ends exchanged would not give. In the rendered world thread never "
-    "runs through tissue.",
+    does_not_show=(
+        "Real thread; the thesis prints no figures to compare with. The start is the true swage, which a "
+        "needle with swapped ends would not give. Rendered thread never runs through tissue."
+    ),
     arms={"true": "true masks", "learned": "learned masks"},
     cases=(VIEWS,),
     tuning=tuple(map(str, TUNING)),

@@ -87,8 +87,10 @@ EXPERIMENT = Experiment(
     title="Vision of tableware on rendered tables",
     simulated="Tables and their images.",
     knows="The camera's pose and the sizes of all dishes; tuned on the same renderer.",
-    does_not_show="What it finds on a real table: sizes of the dishes are known to it and the renderer is the one it "
-    "was tuned on. On real frames it finds about two thirds (below). Milliseconds are of a shared machine.",
+    does_not_show=(
+        "A real table (see below): the sizes of the dishes are known, and the method was tuned on this "
+        "renderer. Milliseconds are of a shared machine."
+    ),
     arms={"ours": "ours", "thesis": "thesis"},
     cases=("detect",),
     tuning=tuple(map(str, TUNING)),

@@ -105,16 +105,20 @@ def printed(results: Results) -> dict[str, Figure]:
 EXPERIMENT = Experiment(
     name="tidy_fast",
     title="Clearing tables in the fast simulator",
-    simulated="Times and slips of actions, fitted to the thesis; no sight, no physics. In `fast` pulls miss as in "
-    "table 7.3 and second piles slip as Pull's trips in table 7.2 imply; in `fast/exact` nothing does; in "
-    "`fast/spills` utensils also slide off dishes that are lifted side by side; in `fast/drops` things also "
-    "fall as often as the thesis's trials failed.",
+    simulated=(
+        "Times and slips of actions, fitted to the thesis; no sight, no physics. `fast`: pulls miss as in "
+        "table 7.3, second piles slip as in table 7.2. `fast/exact`: nothing does. `fast/spills`: utensils "
+        "also slide off dishes lifted side by side. `fast/drops`: things also fall as often as the thesis's "
+        "trials failed."
+    ),
     knows="The whole table, and the chances and times it is judged by.",
-    does_not_show="What an arm does: no physics, no sight. The planner is told the very chances and times it is "
-    "judged by. Times are fitted to a few trials of the thesis, one table a tier. Where the bin is "
-    "near ours is hardly faster than Pull, and slower than the better rival on some tables; the gain "
-    "is with a farther bin. On tier 3 ours is slower than Pull and, beside a near bin, than Stack. "
-    "Where things fall as often as in the thesis's trials ours is slower than Pull and fails too.",
+    does_not_show=(
+        "An arm: no physics, no sight. The planner knows the chances and times that judge it. Times are "
+        "fitted to few trials of the thesis, one table a tier. With a near bin ours is hardly faster than "
+        "Pull and on some tables slower than the better rival; the gain is with a farther bin. On tier 3 ours "
+        "is slower than Pull, and with a near bin than Stack. Where things fall as often as in the thesis's "
+        "trials ours is slower than Pull and fails too."
+    ),
     arms={arm: arm for arm in ARMS},
     cases=CASES,
     default_arms=lambda bench: SHOWN_ARMS,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.stages.fuse.free_space import FreeSpace
-from scenewright.stages.fuse.layout.planes import CELL, Plane
+from scenewright.stages.fuse.layout.planes import BAND, CELL, Plane
 from scipy import ndimage
 
 BEHIND = (0.16, 0.24, 0.32, 0.4, 0.5, 0.6)
@@ -17,6 +17,10 @@ NARROWEST = 3
 """Fewest cells of a doorway in width and height."""
 THIN = 0.35
 """What is thinner than this, and was seen from both sides, is one wall [m]."""
+OVER, DEEP = 2, 1.0
+"""Surface that faces as a plane does, so many cells over its top and at most so far behind it [m], goes on where it
+ends."""
+FACING = float(np.cos(np.radians(15)))
 LARGE = 1.0
 """Area of a plane that speaks neither for a bound of the room nor against [m^2]."""
 VOTES = 1.5
@@ -44,8 +48,8 @@ class Scene:
     """None of a scan."""
 
 
-def share_behind(plane: Plane, scene: Scene) -> tuple[float, float]:
-    """Return the shares of a plane's cells behind which free space was seen, and surface.
+def share_behind(plane: Plane, scene: Scene) -> tuple[float, float, float]:
+    """Return the shares of a plane's cells behind which free space was seen, and surface, and that are thin.
 
     Of what is thin and was seen from both sides only the inside is asked. Beside a doorway free space says nothing.
     """
@@ -67,7 +71,23 @@ def share_behind(plane: Plane, scene: Scene) -> tuple[float, float]:
     beyond = np.flatnonzero((distance < -0.1) & (distance > -far))
     hidden = np.isin(own, np.unique(_keys(plane.cells(scene.vertices[beyond])))) & ~np.isfinite(thickness)
     asked = away > BEHIND[-1]
-    return float(free[asked].mean()) if asked.any() else 0.0, float(hidden.mean())
+    thin = float(np.isfinite(thickness).mean())
+    return float(free[asked].mean()) if asked.any() else 0.0, float(hidden.mean()), thin
+
+
+def share_overtopped(plane: Plane, scene: Scene) -> float:
+    """Return the share of an upright plane's columns over the top of which surface behind it was seen, facing as it
+    does: a wall ends at a ceiling or out of sight, furniture under the wall behind it."""
+    cells = plane.cells(scene.vertices[plane.members])
+    columns, column_of = np.unique(cells[:, 0], return_inverse=True)
+    top = np.full(len(columns), np.iinfo(np.int64).min)
+    np.maximum.at(top, column_of, cells[:, 1])
+    distance = plane.distance(scene.vertices)
+    behind = np.flatnonzero((distance < -BAND) & (distance > -DEEP) & (scene.normals @ plane.normal > FACING))
+    over = plane.cells(scene.vertices[behind])
+    place = np.minimum(np.searchsorted(columns, over[:, 0]), len(columns) - 1)
+    is_over = (columns[place] == over[:, 0]) & (over[:, 1] >= top[place] + OVER)
+    return len(np.unique(place[is_over])) / len(columns)
 
 
 def distance_to_doorway(plane: Plane, cells: np.ndarray, scene: Scene) -> np.ndarray:
@@ -98,7 +118,7 @@ def evidence(plane: Plane, scene: Scene, floor: float, top: float) -> dict[str, 
     floor, top [m]: heights of the floor and of the highest surface.
     """
     points, weight = scene.vertices[plane.members], scene.areas[plane.members]
-    free, hidden = share_behind(plane, scene)
+    free, hidden, thin = share_behind(plane, scene)
     reasons = {
         "area": float(np.clip(np.log(weight.sum() / LARGE), -1.5, 1.5)),
         "free space behind": 2.0 - 25.0 * free if scene.free is not None else 0.0,
@@ -116,7 +136,10 @@ def evidence(plane: Plane, scene: Scene, floor: float, top: float) -> dict[str, 
             reasons["height"] = 1.0 if height > floor + 2.0 else -6.0
     else:
         reach = float(np.quantile(points[:, 2], 0.98))
+        reasons["wall over it"] = -4.0 * share_overtopped(plane, scene)
         reasons["height"] = 1.0 if reach > top - 0.3 else -2.5 if reach < floor + 1.2 else 0.0
+        if thin > 0.5 and reach <= top - 0.3:  # a leaf, a screen: a partition goes up
+            reasons["height"] = -4.0
         if len(scene.cameras):
             reasons["cameras"] = -2.0 if (plane.distance(scene.cameras) > 0).mean() < 0.3 else 0.0
     return reasons

@@ -22,7 +22,7 @@ BEFORE = 0.04
 """Largest distance before the plane of what belongs to it: switches, errors of the map [m]."""
 FLAT = 0.06
 """Surface that faces up and lies no higher over the floor is of it [m]."""
-FRONT = (0.15, 1.0)
+FRONT = (BEFORE, 1.0)
 """A plane so far before a wall beside it is more likely the front of what is built into it [m]."""
 STOREY, OVER_FLOOR = 1.8, -6.0
 """A level less than this over a floor [m] is a top: log odds."""

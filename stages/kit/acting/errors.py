@@ -4,7 +4,7 @@ A network that takes a kettle for a cup takes it for one in the next frame as we
 error is drawn once for a thing, once for a thing and a region of views, or anew in every frame. Which of the three a
 thing has is drawn too, in shares that give two sights of a thing the correlation that was measured: of two sights from
 one region, and from two. Maps, plans and the mobile agent have the same model; its rates are data
-(data/errors/segmenters.toml, docs/results/gap.md).
+(data/errors/segmenters.toml, docs/results/real.md).
 """
 
 from __future__ import annotations

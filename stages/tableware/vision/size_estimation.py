@@ -56,7 +56,7 @@ HOLLOW_SHARE = 0.4
 
 @dataclass(frozen=True)
 class Limits:
-    """What counts as a dish. The defaults were set while looking at nine real frames (docs/results/tidy_detect.md)."""
+    """What counts as a dish. The defaults were set while looking at nine real frames (docs/results/tidy.md)."""
 
     least_round: float = 0.35
     """Share of a circle's directions in which the upper edge must lie on it, times the share of the edge's outline that

@@ -56,6 +56,15 @@ def test_a_page_of_results_begins_with_what_it_does_not_show(page: Path) -> None
     assert shown[0].startswith("**What this does not show.**")
 
 
+@pytest.mark.parametrize("page", sorted(RESULTS.glob("*.md")), ids=lambda page: page.name)
+def test_no_table_stands_before_what_its_figures_do_not_show(page: Path) -> None:
+    """Of experiments that have their page here: a page may hold several."""
+    markers = re.findall(r"<!-- (about|table|rows) (\w+)", page.read_text())
+    told = {name for kind, name in markers if kind == "about"}
+    for place, (kind, name) in enumerate(markers):
+        assert kind == "about" or name not in told or ("about", name) in markers[:place], name
+
+
 def test_every_experiment_has_one_page(experiments: dict[str, Experiment]) -> None:
     about = Counter(name for page in RESULTS.glob("*.md") for name in re.findall(r"<!-- about (\w+)", page.read_text()))
     assert about == Counter(list(experiments))
@@ -72,11 +81,25 @@ def test_every_page_of_results_is_linked_from_the_index() -> None:
     ] == []
 
 
+def words_of(text: str) -> int:
+    """Return how many words a page has, without its generated tables and link targets."""
+    text = re.sub(r"<!-- (table|rows|headlines).*?<!-- /\1 -->", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    text = re.sub(r"\]\([^)]*\)", "]", text)
+    return len([word for word in text.split() if re.search(r"\w", word)])
+
+
 def test_readme_is_short() -> None:
     text = re.sub(r"<!--.*?-->", "", (ROOT / "README.md").read_text(), flags=re.DOTALL)
     text = re.sub(r"\]\([^)]*\)", "]", text)
     words = [word for word in text.split() if re.search(r"\w", word)]
     assert len(words) <= WORDS
+
+
+def test_results_decisions_and_changes_are_short() -> None:
+    assert sum(words_of(page.read_text()) for page in RESULTS.glob("*.md")) <= 16_000
+    assert words_of((ROOT / "docs" / "DECISIONS.md").read_text()) <= 1_200
+    assert len((ROOT / "CHANGELOG.md").read_text().splitlines()) <= 50
 
 
 CONTENT: dict[str, Any] = {

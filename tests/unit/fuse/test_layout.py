@@ -26,6 +26,13 @@ COUNTER = Block("cabinet", (0, 3.4, 0), (2.5, 4, 0.9))
 TABLE = Block("table", (3, 1, 0.68), (4.4, 1.8, 0.72))
 BED, SOFA = Block("bed", (0, 2, 0), (2, 3.8, 0.5)), Block("sofa", (3, 3, 0), (4.9, 3.9, 0.42))
 PARTITION = Block("wall", (2.4, 0, 0), (2.5, 2.6, 2.5))
+FRIDGE = (
+    Block("fridge", (4.15, 1.5, 0), (4.9, 1.55, 1.75)),
+    Block("fridge", (4.15, 2.25, 0), (4.9, 2.3, 1.75)),
+    Block("fridge", (4.88, 1.5, 0), (4.92, 2.3, 1.75)),
+    Block("fridge", (4.15, 1.5, 0.6), (4.9, 2.3, 0.63)),
+)
+LEAF = Block("fridge", (3.4, 2.26, 0.7), (4.1, 2.3, 1.75))
 STOREY = Block("floor", (0, 0, 2.6), (3, 4, 2.8))
 ROOMS = {
     "box": (ROOM, EYES),
@@ -35,6 +42,7 @@ ROOMS = {
     "storeys": ((*walls_around(5, 4, 5.4), STOREY), ((2, 2, 1.5), (4, 2, 1.5), (2, 2, 4.3), (1, 1, 4.3))),
     "corridor": (walls_around(6, 1.2, 2.5, but="ew"), ((1.0, 0.6, 1.5), (4.0, 0.6, 1.5))),
     "one wall": ((Block("wall", (-2, 2, 0), (4, 2.1, 2.5)),), ((1.0, 0.0, 1.5),)),
+    "open fridge": ((*ROOM, *FRIDGE, LEAF), ((1.2, 1.2, 1.5), (3.4, 2.2, 1.6), (1.0, 3.2, 1.6))),
     "tabletop": ((TABLE, Block("cup", (3.5, 1.3, 0.72), (3.6, 1.4, 0.82))), ((3.6, 0.4, 1.2),)),
 }
 
@@ -90,6 +98,17 @@ def test_what_stands_at_a_partition_is_not_of_the_wall_on_its_other_side() -> No
     layout = find_layout(replace(scene, furniture=(owner == len(ROOM) + 1).astype(float)))
     front = (owner == len(ROOM) + 1) & (scene.vertices[:, 0] > 2.62) & (scene.vertices[:, 2] > 0.1)
     assert front.sum() > 100 and not layout.owner[front].any()
+
+
+def test_a_leaf_that_stands_open_and_the_back_behind_it_are_no_walls() -> None:
+    scene, owner, layout = view("open fridge")
+    assert bounds(layout) == AROUND
+    leaf, back = owner == len(ROOM) + len(FRIDGE), owner == len(ROOM) + 2
+    assert leaf.sum() > 300 and not layout.owner[leaf].any()
+    judged = [
+        each for each in layout.planes if set(np.unique(owner[each.plane.members])) & {len(ROOM) + 4, len(ROOM) + 2}
+    ]
+    assert back.sum() > 100 and all(each.log_odds < 0 for each in judged)
 
 
 @pytest.mark.parametrize("name", ["kitchen", "bedroom"])

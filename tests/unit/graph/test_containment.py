@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.graph.enclosing import surrounded_share
+from scenewright.stages.kit.geometry.boxes import box_from_bounds
 
 from tests.panoptic_maps import box_mesh, floor_mesh, placed, seen_surface
 
@@ -83,9 +85,12 @@ EXPECTED = {
 }
 
 
-def test_parents_and_inner_surfaces(meshes, build_graph):
-    graph: ContactGraphFile = build_graph(meshes, CLASSES)
+@pytest.mark.parametrize("named", [True, False])
+def test_parents_and_inner_surfaces(meshes, build_graph, named: bool):
+    classes = CLASSES if named else CLASSES | {2: "object", 5: "object"}
+    graph: ContactGraphFile = build_graph(meshes, classes)
     for name, (parent, relation, height) in EXPECTED.items():
+        parent = parent if named else f"object_{parent.rsplit('_', 1)[1]}"
         link = graph.parent_link(name)
         assert (link.source, link.relation) == (parent, relation), name
         plane = graph.node(parent).planes[link.plane]
@@ -96,3 +101,26 @@ def test_parents_and_inner_surfaces(meshes, build_graph):
         else:
             assert link.inside is None
         assert np.hypot(*np.subtract(link.contact[:2], graph.node(name).box.center[:2])) < 0.05, name
+
+
+def upright(*angles: float, height: float = 0.5) -> np.ndarray:
+    """Points of a sheet around the origin over each pair of angles [degrees], 0.3 m away."""
+    around = np.radians(np.concatenate([np.arange(a, b, 2.0) for a, b in zip(angles[::2], angles[1::2], strict=True)]))
+    heights = np.arange(0.0, height, 0.02)
+    ring = 0.3 * np.stack([np.cos(around), np.sin(around)], axis=1)
+    return np.column_stack([np.repeat(ring, len(heights), axis=0), np.tile(heights, len(ring))])
+
+
+@pytest.mark.parametrize(
+    ("points", "share"),
+    [
+        (upright(1, 90), 4 / 16),
+        (upright(1, 270), 12 / 16),
+        (upright(1, 360), 1.0),
+        (upright(1, 360, height=0.02), 0.0),
+        (4 * upright(1, 360), 0.0),
+        (np.zeros((0, 3)), 0.0),
+    ],
+)
+def test_a_share_of_directions_has_a_side(points: np.ndarray, share: float) -> None:
+    assert surrounded_share(points, box_from_bounds((-0.05, -0.05, 0.0), (0.05, 0.05, 0.2))) == pytest.approx(share)
