@@ -13,6 +13,7 @@ from scenewright.cli import edit_command
 from scenewright.cli.batch_command import batch
 from scenewright.cli.collection_command import gc
 from scenewright.cli.comparison_command import diff
+from scenewright.cli.explain_command import explain
 from scenewright.cli.follow_command import follow
 from scenewright.cli.inspect_command import inspect
 from scenewright.cli.output import out as _out
@@ -301,6 +302,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (batch, "Pipelines"),
     (view, "Artifacts"),
     (inspect, "Artifacts"),
+    (explain, "Artifacts"),
     (verify, "Artifacts"),
     (urdf_check, "Artifacts"),
     (urdf_settle, "Artifacts"),

@@ -40,7 +40,7 @@ def serve(
     quiet: Annotated[bool, typer.Option("--quiet", help="Warnings only.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show every request, and the traceback of an error.")] = False,
 ) -> int:
-    """Serve a backend of `segment` over HTTP until it is interrupted (docs/SEGMENTATION.md has the protocol).
+    """Serve a backend of `segment` over HTTP until it is interrupted (docs/FORMATS.md has the protocol).
 
     Prints the address to give to `segment --backend` once it answers. There is no encryption and no password.
     """

@@ -30,7 +30,7 @@ def urdf_protocol(
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
-    """Judge a scene by the protocol of docs/PROTOCOL.md: let go for 5 s in MuJoCo and Bullet, pairs of bodies in each
+    """Judge a scene by the protocol of docs/FORMATS.md: let go for 5 s in MuJoCo and Bullet, pairs of bodies in each
     other, joints swept, and what was kept of what was seen. Nothing that a file says is executed. Exits with 4 when a
     free body is not stable, lies in another, or a joint is blocked where it begins, or when nothing can move.
     """
@@ -64,7 +64,7 @@ def _check_out(folder: Path) -> None:
     inside = sorted(path.name for path in folder.iterdir()) if folder.exists() else []
     others = [name for name in inside if name not in (JSON_NAME, PICTURE_NAME)]
     if others:
-        raise UsageError(f"--out {folder}: it holds {others[0]:.60}, which is no protocol", hint=hint)
+        raise UsageError(f"--out {folder}: it holds {others[0]:.60}, which is not a protocol", hint=hint)
 
 
 def _write(out: Path, folder: Path, document: dict[str, object]) -> None:

@@ -24,7 +24,7 @@ def convert_weights(
     if out.exists():
         raise UsageError(f"{out}: exists", hint="choose another --out")
     if not file.is_file():
-        raise MissingDependency(f"{file}: no such file", hint="fetch the authors' models, see docs/DISPARITY.md")
+        raise MissingDependency(f"{file}: no such file", hint="fetch the authors' models, see docs/MAPPING.md")
     convert(file, out)
     output.out(str(out))
     return 0

@@ -1,6 +1,6 @@
 """A contact sheet of a CAD library, a tile a class: python docs/library_sheet.py LIBRARY PICTURE [MODEL_ID ...].
 
-Doors, drawers and lids stand half open. With model ids only those are shown. The table of classes in docs/LIBRARY.md is
+Doors, drawers and lids stand half open. With model ids only those are shown. The table of classes in docs/FORMATS.md is
 printed.
 """
 

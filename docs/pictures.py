@@ -63,7 +63,7 @@ def main(run: Path) -> None:
 
 
 def write_gallery(folder: Path, pictures: dict[str, np.ndarray]) -> None:
-    """Write a picture a step for docs/GALLERY.md, half as wide."""
+    """Write a picture a step for docs/index.md, half as wide."""
     for step, texts in GALLERY.items():
         row = in_a_row([pictures[text] for text in texts])
         scale = WIDTH // 2 / row.shape[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import sys
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,17 @@ from scenewright.stages.kit.stage import External, Optionally, Stage  # noqa: E4
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
     from mkdocs.structure.files import Files
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Print below every page which version the pages are of."""
+    config.copyright = f"scenewright {version()}"
+    return config
+
+
+def version() -> str:
+    """Return the version that pyproject.toml states."""
+    return str(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"])
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

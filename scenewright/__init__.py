@@ -1,4 +1,4 @@
-"""Scenewright from Python: `from scenewright import load, load_run, payload` (docs/PYTHON.md).
+"""Scenewright from Python: `from scenewright import load, load_run, payload` (docs/EDIT.md).
 
 `scenewright.stages`, `scenewright.schemas` and `scenewright.cli` lie in this package where it was installed as a wheel,
 and beside its folder in a checkout.

@@ -37,7 +37,7 @@ Transform = Annotated[tuple[tuple[float, ...], ...], AfterValidator(_check_rows(
 
 def _check_name(value: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,199}", value):
-        raise ValueError(f"{value!r:.60} is no plain name (ASCII letters, digits, _ . -)")
+        raise ValueError(f"{value!r:.60} is not a plain name (ASCII letters, digits, _ . -)")
     return value
 
 

@@ -64,6 +64,17 @@ class JointEvidence(Model):
     """How it was seen to move; the joint of the scene has this axis, and reaches at least as far."""
 
 
+class Inferred(Model):
+    """What nobody saw of a thing that keeps its mesh, and has to be there, or it would not stand."""
+
+    what: str
+    """Legs, a bottom, depth; empty where nothing has room: then the thing is held."""
+    because: str
+    """Why."""
+    pieces: tuple[tuple[Vector3, ...], ...] = ()
+    """Corners of the convex pieces that are added, world frame [m]. All of their faces are inferred, none was seen."""
+
+
 class Replacement(Model):
     """What stands for one graph node."""
 
@@ -81,6 +92,8 @@ class Replacement(Model):
     alternatives: tuple[CadCandidate, ...] = ()
     rejected: dict[str, int] = {}
     """Reason -> number of candidates discarded."""
+    inferred: Inferred | None = Field(default=None, exclude_if=lambda inferred: inferred is None)
+    """What is added to the mesh. Absent where it stands as it was seen, and where it need not."""
     joint_evidence: dict[str, JointEvidence] | None = Field(default=None, exclude_if=lambda evidence: evidence is None)
     """Joint of the chosen model -> why it is believed. Absent where nobody asked (older scenes, `--method thesis`):
     then all joints are."""

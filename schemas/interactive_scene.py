@@ -38,6 +38,9 @@ class SceneBody(Model):
     mass: float
     contains: bool = False
     grasp_width: float | None = None
+    because: str = Field(default="", exclude_if=lambda value: not value)
+    """`inferred: ...`: what of its shape nobody saw, and why it has to be there (its visual shapes are called
+    `inferred_<number>.obj`); `held: ...`: why it is fixed although it could be pushed. Absent otherwise."""
 
     @property
     def carriable(self) -> bool:

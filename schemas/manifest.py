@@ -36,7 +36,7 @@ LONGEST_PATH = 4096
 
 def _check_path(path: str) -> str:
     if not path or "\0" in path or len(path) > LONGEST_PATH:
-        raise ValueError(f"{path!r:.60} is no path")
+        raise ValueError(f"{path!r:.60} is not a path")
     return path
 
 

@@ -97,7 +97,7 @@ def file_text(path: Path | str, largest: int, *, error: type[ScenewrightError] =
     try:
         return file_content(path, largest, error=error, hint=hint).decode("utf-8-sig")
     except UnicodeDecodeError as failed:
-        raise error(f"{path}: not a text file (byte {failed.start} is no UTF-8)", hint=hint) from None
+        raise error(f"{path}: not a text file (byte {failed.start} is not UTF-8)", hint=hint) from None
 
 
 def file_json(path: Path | str, largest: int, *, error: type[ScenewrightError] = BadInput, hint: str = "") -> Any:

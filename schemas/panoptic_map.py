@@ -120,11 +120,13 @@ class LayoutFile(Model):
 
 
 class PanopticMap(Artifact):
-    """`mesh.ply` (whole map, colour), `mesh_labels.npz` (`instance`, `segment`, `class_id`: (V,) int32 per vertex
-    of mesh.ply, 0 = unlabelled), `entities/<instance>.ply`, `entities.json`, `counts.npz` (the triple-wise
-    count: `segment`, `class_id`, `instance`, `count`, each (K,)), `volume.npz` (`block_coordinates` (B, 3) int32,
-    blocks sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation
-    distances, `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). With `--snapshot-every`
+    """`mesh.ply` (whole map, colour), `mesh_labels.npz` (`instance`, `segment`, `class_id`: (V,) int32 per vertex of
+    mesh.ply, 0 = unlabelled), `entities/<instance>.ply`, `entities.json`, `counts.npz` (the triple-wise count:
+    `segment`, `class_id`, `instance`, `count`, each (K,)), `volume.npz` (`block_coordinates` (B, 3) int32, blocks
+    sorted by z, y, x; over the 8^3 voxels of a block, x fastest: `tsdf` (B, 512) float16 in truncation distances,
+    `weight` (B, 512) float16, `segment` (B, 512) int32, `color` (B, 512, 3) uint8). Of frames, by `--merging ours`,
+    `free_space.npz`, the cells that frames saw through: `block_coordinates` (B, 3) int32, `free` (B, 64) uint8, a bit
+    for each of a block's 8^3 cells, x fastest, the lowest bit first, `edge` (1,) of a cell [m]. With `--snapshot-every`
     also `snapshots/<frames>/`, the map as it was after so many frames: entities.json, entities/ and mesh.ply. Of an
     annotated scan (`--from-mesh`) there are no counts and no volume. Of frames, by `--merging ours`, `layout.json` says
     which planes bound the room and why, `because.json` how each entity was found and named. Of an edited map (`edit

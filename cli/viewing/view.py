@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import scenewright.cli.viewing
+from scenewright.cli.explaining.explaining import sentences
 from scenewright.cli.viewing.rerun_canvas import RerunCanvas, import_rerun
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput, UsageError
@@ -59,6 +60,7 @@ def view_artifact(path: Path, save: Path | None = None) -> None:
         assert save is not None
         with PageCanvas(name, save) as page:
             draw(artifact, page)
+            page.explain(sentences(artifact))
     else:
         with RerunCanvas(name, save) as recording:
             draw(artifact, recording)

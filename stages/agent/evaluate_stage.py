@@ -21,7 +21,7 @@ def run(*, parameters: EvaluateParameters, context: Context) -> AgentEvaluation:
     for names, available, sort in ((parameters.tasks, TASKS, "task"), (parameters.arms, ARMS, "arm")):
         for name in names:
             if name not in available:
-                raise UsageError(f"there is no {sort} {name!r}", hint=f"choose of {', '.join(available)}")
+                raise UsageError(f"there is no {sort} {name!r}", hint=f"choose one of {', '.join(available)}")
     rows = []
     for task in context.progress.track(parameters.tasks, total=len(parameters.tasks), description="tasks"):
         by_arm = _scores(task, parameters)

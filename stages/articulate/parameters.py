@@ -12,21 +12,20 @@ from scenewright.stages.kit.stage import Optionally, Parameters, Stage
 class ArticulateParameters(Parameters):
     """Options of `articulate`."""
 
-    voxel_size: float = Field(0.03, ge=0.01, le=0.2, description="Edge of the voxels that are watched [m]")
-    every: int = Field(1, ge=1, description="Use every how many-th frame")
-    maximum_depth: float = Field(4.0, gt=0.5, description="Farther depth is not used [m]")
+    voxel_size: float = Field(0.03, ge=0.01, le=0.2, description="Voxel edge of the change detection [m]")
+    every: int = Field(1, ge=1, description="Use every n-th frame")
+    maximum_depth: float = Field(4.0, gt=0.5, description="Maximum depth [m]")
     frames_seen: int = Field(
-        3, ge=1, le=100, description="A voxel is full, or empty, when so many more frames say so than the opposite"
+        3, ge=1, le=100, description="Frames by which one state of a voxel (occupied or free) must outvote the other"
     )
     pose_tolerance: float = Field(
-        0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
+        0.02, ge=0, description="Largest time difference between a pose of --trajectory and its frame [s]"
     )
     minimum_overlap: float = Field(
         0.7,
         gt=0,
         le=1,
-        description="A joint is believed when this share of what was left lies where something came, when it is moved, "
-        "and this share of what came lay where something was",
+        description="Least overlap of the part before and after, once moved by the joint (both ways, 0 to 1)",
     )
 
 

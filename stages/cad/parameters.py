@@ -19,17 +19,15 @@ class CadParameters(Parameters):
 
     method: Literal["ours", "thesis"] = Field(
         "ours",
-        description="`thesis`: matching, alignment and check as in section 2.4; `ours`: poses and joints are then "
-        "refined on the vertices, and the choice also weighs the size",
+        description="`thesis`: section 2.4 as written; `ours`: also refines poses and joints on the vertices, "
+        "and weighs the size",
     )
     candidates: int = Field(10, ge=1, description="Oriented candidates kept after matching")
     matched: int = Field(
-        160, ge=1, description="ours: oriented candidates that are compared with the vertices where matching puts them"
+        160, ge=1, description="ours: oriented candidates screened against the vertices before the alignment"
     )
     screening: int = Field(
-        2,
-        ge=1,
-        description="ours: so many times more candidates are aligned, and those with the least alignment error kept",
+        2, ge=1, description="ours: factor of candidates aligned; those with the least alignment error are kept"
     )
     size_weight: float = Field(1.0, ge=0.0, description="omega_1 of the matching error (2.7): relative size")
     plane_weight: float = Field(1.0, ge=0.0, description="omega_2 of the matching error (2.7): surface planes")
@@ -37,10 +35,10 @@ class CadParameters(Parameters):
     unmatched_plane: float = Field(
         1.0,
         ge=0.0,
-        description="ours: matching error of a plane that finds no partner (`thesis` rejects models with fewer planes)",
+        description="ours: matching error of an unmatched plane (`thesis` rejects models with fewer planes)",
     )
-    minimum_scale: float = Field(0.6, gt=0.0, description="Smaller scales of a CAD model are rejected")
-    maximum_scale: float = Field(1.6, gt=0.0, description="Larger scales of a CAD model are rejected")
+    minimum_scale: float = Field(0.6, gt=0.0, description="Minimum scale of a CAD model")
+    maximum_scale: float = Field(1.6, gt=0.0, description="Maximum scale of a CAD model")
     support_weight: float = Field(8.0, ge=0.0, description="Alignment: weight of supporting planes' offsets")
     offset_weight: float = Field(5.0, ge=0.0, description="Alignment: weight of other planes' offsets")
     angle_weight: float = Field(5.0, ge=0.0, description="Alignment: weight of planes' angles")
@@ -49,93 +47,64 @@ class CadParameters(Parameters):
     evaluations: int = Field(1000, ge=1, description="Alignment: most evaluations of the residuals")
     vertices: int = Field(1500, ge=10, description="Object vertices drawn for the alignment error")
     misfit_weight: float = Field(
-        0.05,
-        ge=0.0,
-        description="ours: metres of extent that differ from the observed box count this much beside the "
-        "alignment error (vertices of a partial mesh fit every model that is large enough)",
+        0.05, ge=0.0, description="ours: weight of the difference in extent from the observed box"
     )
     tilt_weight: float = Field(
-        0.02,
-        ge=0.0,
-        description="ours: not standing upright (2.10) counts this much beside the alignment error; "
-        "furniture only stands upright",
+        0.02, ge=0.0, description="ours: weight of the tilt (2.10); furniture only stands upright"
     )
     free_space_weight: float = Field(
-        0.5,
-        ge=0.0,
-        description="ours: metres by which the model's surface fills space that was seen empty count this much beside "
-        "the alignment error",
+        0.5, ge=0.0, description="ours: weight of the model's surface in observed free space"
     )
     scale_weight: float = Field(
-        0.03,
-        ge=0.0,
-        description="ours: |ln(scale)| counts this much beside the alignment error, as the library's "
-        "models have the size of real things",
+        0.03, ge=0.0, description="ours: weight of |ln(scale)|; models of the library have real sizes"
     )
-    carrying_weight: float = Field(
-        0.1,
-        ge=0.0,
-        description="ours: the height by which children would move counts this much beside the alignment error",
-    )
-    facing_weight: float = Field(
-        0.004,
-        ge=0.0,
-        description="ours: a front that looks at the wall right behind counts this much beside the alignment error",
-    )
+    carrying_weight: float = Field(0.1, ge=0.0, description="ours: weight of the height by which children would move")
+    facing_weight: float = Field(0.004, ge=0.0, description="ours: weight of a front that faces the wall behind it")
     choice_margin: float = Field(
         0.01,
         ge=0.0,
-        description="ours: min-conflicts only exchanges candidates whose score is this close to the best: "
-        "a wrong model is worse than a collision that a small shift resolves [m]",
+        description="ours: largest score difference from the best over which min-conflicts exchanges candidates [m]",
     )
-    maximum_alignment_error: float = Field(
-        0.08, gt=0.0, description="ours: candidates with a larger alignment error are no candidates [m]"
-    )
+    maximum_alignment_error: float = Field(0.08, gt=0.0, description="ours: maximum alignment error of a candidate [m]")
     area_threshold: float = Field(
         0.5, ge=0.0, le=1.0, description="b_th: least share of a child's footprint over the CAD model's surface"
     )
     support_tolerance: float = Field(
         0.12, gt=0.0, description="Largest height difference of a child's old and new supporting surface [m]"
     )
-    wall_penetration: float = Field(0.15, ge=0.0, description="Candidates deeper than this in a wall are rejected [m]")
-    collision_tolerance: float = Field(
-        0.015, ge=0.0, description="Objects that interpenetrate by more than this are in conflict [m]"
-    )
+    wall_penetration: float = Field(0.15, ge=0.0, description="Maximum penetration of a wall [m]")
+    collision_tolerance: float = Field(0.015, ge=0.0, description="Penetration from which two objects collide [m]")
     conflict_iterations: int = Field(50, ge=0, description="Most steps of min-conflicts")
     maximum_shift: float = Field(
-        0.08, ge=0.0, description="ours: objects that lie in others are moved aside by at most this, 0 for none [m]"
+        0.08, ge=0.0, description="ours: maximum shift that resolves a collision, 0 for none [m]"
     )
-    resting_tolerance: float = Field(
-        0.002, ge=0.0, description="ours: penetration that is left in the finished scene where there is any way [m]"
-    )
+    resting_tolerance: float = Field(0.002, ge=0.0, description="ours: penetration aimed at in the finished scene [m]")
     vouched: tuple[str, ...] = Field(
         (),
-        description="ours: things (nodes, as fridge_3) and classes that somebody knows to move as their models do; "
-        "joints of others need a ground: seen to move, open, a handle, a seam",
+        description="ours: nodes (fridge_3) and classes whose joints are believed without evidence; others "
+        "need motion, an open part, a handle or a seam",
     )
     recognition_error: float = Field(
         0.028,
         ge=0.0,
-        description="ours: a thing without a name, or with one that no model fits as well, takes the class of the "
-        "model that fits it so well; 0 for never [m]",
+        description="ours: maximum error at which an object takes the class of a model of another class; 0 "
+        "for never [m]",
     )
     recognition_margin: float = Field(
-        0.01, ge=0.0, description="ours: as long as models of all other classes fit it worse by this [m]"
+        0.01, ge=0.0, description="ours: least margin of that error to all other classes [m]"
     )
     built_ins: bool = Field(
-        True, description="ours: a thing that no model fits becomes a run of boxes made for it, where that explains it"
+        True, description="ours: replace an object without model by boxes fitted to it, where these explain its surface"
     )
     stretched: bool = Field(
-        True, description="ours: what no model is as large as may become one that is stretched along its own axes"
+        True, description="ours: stretch a model along its own axes where none has the size of the object"
     )
-    surroundings: bool = Field(
-        True, description="ours: what the map shows and nothing has a name for becomes a static body of the scene"
-    )
+    surroundings: bool = Field(True, description="ours: keep unlabelled surface of the map as a static body")
     surroundings_clearance: float = Field(
-        0.03, ge=0.0, description="Nameless surface this near to something named counts as its rim [m]"
+        0.03, ge=0.0, description="Unlabelled surface this near to an entity belongs to its rim [m]"
     )
     surroundings_area: float = Field(
-        0.02, ge=0.0, description="Connected nameless patches with less surface are noise [m²]"
+        0.02, ge=0.0, description="Smallest connected unlabelled surface that is kept [m²]"
     )
 
 

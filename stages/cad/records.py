@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scenewright.schemas.base import as_transform
-from scenewright.schemas.cad_scene import CadCandidate, CadSceneFile, JointEvidence, Replacement
+from scenewright.schemas.cad_scene import CadCandidate, CadSceneFile, Inferred, JointEvidence, Replacement
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import TREE_RELATIONS
 from scenewright.stages.cad.arranging import Arrangement, shifted_box
@@ -37,11 +37,12 @@ def scene_file(
     arranged: Arrangement,
     colors: dict[str, dict[str, tuple[int, int, int]]],
     evidence: dict[str, dict[str, JointEvidence]],
+    inferred: dict[str, Inferred],
     selection: Selection,
     conflicts_after: int,
 ) -> CadSceneFile:
     """Return scene.json: the decision on every node. `colors`: node -> part -> colour in the map; `evidence`: node ->
-    joint -> why it is believed, for the nodes where that was asked."""
+    joint -> why it is believed, for the nodes where that was asked; `inferred`: node -> what is added to its mesh."""
     replacements = []
     for node in graph.nodes:
         if node.node_type == "layout":
@@ -68,7 +69,10 @@ def scene_file(
             entry = shortlists[node.id]
             went = float(np.linalg.norm(arranged.shifts.get(node.id, 0.0)))
             reason = f"{entry.reason}; moved by {1000 * went:.0f} mm" if went > 5e-4 else entry.reason
-            replacements.append(Replacement(node=node.id, decision="mesh", reason=reason, rejected=entry.rejected))
+            added = inferred.get(node.id)
+            replacements.append(
+                Replacement(node=node.id, decision="mesh", reason=reason, rejected=entry.rejected, inferred=added)
+            )
     return CadSceneFile(
         replacements=tuple(replacements),
         conflicts_before=selection.conflicts_before,

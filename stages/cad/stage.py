@@ -21,6 +21,7 @@ from scenewright.stages.cad.built_ins import is_built_in, may_be_built_in
 from scenewright.stages.cad.candidates import Shortlist, models_for, object_points, shortlist
 from scenewright.stages.cad.choosing import adjust, select
 from scenewright.stages.cad.coloring import part_colors
+from scenewright.stages.cad.completing import completed, hulls_of
 from scenewright.stages.cad.conflicts import placed_pieces
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
 from scenewright.stages.cad.method import CadMethod
@@ -96,19 +97,25 @@ def choose_and_write(
             copy_meshes(graph, chosen, panoptic_map, context)
             obstacles = obstacles_of(graph, layout, context.output / "meshes")
             solids = {name: convex_solid(pieces) for name, pieces in obstacles.items()}
-        arranged, conflicts_after = adjust(
-            graph, chosen, shortlists, surfaces, solids, floor_levels(graph, layout), method
-        )
+        levels = floor_levels(graph, layout)
+        arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         move_meshes(arranged, context.output / "meshes")
     built = [name for name, placement in arranged.placements.items() if is_built_in(placement.shape.model)]
     nameless: EntityMesh | None = None
+    still, final = np.zeros(3), cad_graph(graph, arranged, surfaces)
+    standing = {
+        name: [(vertices + arranged.shifts.get(name, still), faces) for vertices, faces in some]
+        for name, some in obstacles.items()
+    }
+    standing |= {name: placed_pieces(p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items()}
+    with context.progress.step("complete what would not stand"):
+        free_space = method.free_space(panoptic_map)
+        inferred = completed(final, context.output / "meshes", standing, levels, arranged.shifts, free_space)
     if method.keeps_surroundings:
         with context.progress.step("surroundings"):
-            still = np.zeros(3)
-            pieces = [(v + arranged.shifts.get(name, still), f) for name, some in obstacles.items() for v, f in some]
-            for placement in arranged.placements.values():
-                placed = placed_pieces(placement, surfaces[placement.shape.model.id])
-                pieces += [*placed, footing(placed)]
+            pieces = [piece for some in standing.values() for piece in some]
+            pieces += [footing(standing[name]) for name in arranged.placements]
+            pieces += [pair for added in inferred.values() for pair in hulls_of(added)]
             unmoving = [graph.node(name).instance for name in built if not arranged.placements[name].shape.model.joints]
             nameless = surroundings_of(panoptic_map, pieces, unmoving, method.parameters)
     with context.progress.step("writing"):
@@ -116,9 +123,9 @@ def choose_and_write(
             write_surface(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
         evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
-        scene = scene_file(graph, shortlists, arranged, colors, evidence, selection, conflicts_after)
+        scene = scene_file(graph, shortlists, arranged, colors, evidence, inferred, selection, conflicts_after)
         scene.write(context.output / "scene.json")
-        cad_graph(graph, arranged, surfaces).write(context.output / "graph.json")
+        final.write(context.output / "graph.json")
         copy_models(arranged, library, context)
 
     decisions = [replacement.decision for replacement in scene.replacements]
@@ -128,6 +135,7 @@ def choose_and_write(
         "built_in": len(built),
         "mesh": decisions.count("mesh"),
         "layout": decisions.count("layout"),
+        "completed": sum(bool(added.pieces) for added in inferred.values()),
         "conflicts_before": scene.conflicts_before,
         "conflicts_after": scene.conflicts_after,
         "surroundings_m2": 0.0 if nameless is None else round(area_of(nameless), 2),

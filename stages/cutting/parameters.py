@@ -97,7 +97,7 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
     goals = [f"--{name.replace('_', '-')}" for name in given_inputs if name.startswith("goal")]
     goals += ["--goal"] if parameters.goal else []
     if len(goals) > 1:
-        raise UsageError(f"{' and '.join(goals)} both say what is wanted", hint="give one of them")
+        raise UsageError(f"{' and '.join(goals)} both set the goal", hint="give one of them")
     if parameters.goal:
         read_words(parameters.goal)
         if parameters.method != "ours":
@@ -110,7 +110,7 @@ def check_plan(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:
     if parameters.together and parameters.method != "ours":
         raise UsageError(f"--together: {parameters.method} cuts one piece at a time", hint="--method ours")
     if "demonstrations" in given_inputs and inputs.get("mesh") is not None:
-        raise UsageError("--mesh and --demonstrations both say what is cut", hint="give one of them")
+        raise UsageError("--mesh and --demonstrations both set the object", hint="give one of them")
 
 
 DEMONSTRATE = Stage(

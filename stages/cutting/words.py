@@ -21,7 +21,7 @@ def read_words(text: str) -> list[tuple[int, CategoryName]]:
     for part in re.split(r",|\band\b", text):
         match = _PART.fullmatch(part)
         if match is None:
-            raise UsageError(f"--goal: {part.strip()!r:.60} is no number with a category", hint=hint)
+            raise UsageError(f"--goal: {part.strip()!r:.60} is not a number with a category", hint=hint)
         name = categories.get(match[2].removesuffix("s"))
         if name is None:
             raise UsageError(f"--goal: there is no category {match[2]!r:.40}", hint=hint)

@@ -24,34 +24,33 @@ class DisparityParameters(Parameters):
         "with --weights",
     )
     effort: Literal["low", "medium", "high"] = Field(
-        "medium", description="`semi-global`: directions that costs are gathered along (3, 4, 8)"
+        "medium", description="`semi-global`: number of aggregation paths (3, 4, 8)"
     )
-    block_size: int = Field(3, ge=1, le=11, description="`semi-global`: odd width of the compared squares [px]")
+    block_size: int = Field(3, ge=1, le=11, description="`semi-global`: block size, odd [px]")
     agreement: float = Field(
-        1.0, gt=0, le=16, description="Matches from left to right and back may differ by this much [px]"
+        1.0, gt=0, le=16, description="Left-right consistency: largest difference of the two disparities [px]"
     )
-    refine: bool = Field(True, description="`semi-global`: undo the pull to whole pixels and smooth within surfaces")
+    refine: bool = Field(
+        True, description="`semi-global`: subpixel refinement: undo pixel locking and smooth within surfaces"
+    )
     lowest_disparity: int | None = Field(
-        None, ge=0, le=4096, description="Disparities from here on are searched [px]; default: as every pair needs"
+        None, ge=0, le=4096, description="Lowest disparity searched [px]; default: as every pair needs"
     )
     levels: int | None = Field(
-        None, ge=16, le=4096, description="So many disparities are searched, a multiple of 16; with lowest_disparity"
+        None, ge=16, le=4096, description="Number of disparities searched, a multiple of 16; with lowest_disparity"
     )
     iterations: int | None = Field(
-        None, ge=1, le=128, description="`raft-stereo`: updates of the disparity; default: 32, of our small network 5"
+        None, ge=1, le=128, description="`raft-stereo`: iterations; default: 32, of our small network 5"
     )
-    minimum_confidence: float = Field(0.3, ge=0, le=1, description="Less confident disparities give no depth")
-    maximum_depth: float = Field(20.0, gt=0, le=65.0, description="Farther depth is left out [m]")
+    minimum_confidence: float = Field(0.3, ge=0, le=1, description="Minimum confidence of depth")
+    maximum_depth: float = Field(20.0, gt=0, le=65.0, description="Maximum depth [m]")
     rectification: Literal["correct", "report", "refuse"] = Field(
         "correct",
-        description="When matched features lie in different rows: `correct` turns the right eye back where a small "
-        "turn explains it, `report` says so and goes on, `refuse` stops",
+        description="Where epipolar lines are not the rows: `correct` rotates the right camera, `report` "
+        "warns and goes on, `refuse` stops",
     )
     largest_row_error: float = Field(
-        0.5,
-        gt=0,
-        le=20,
-        description="Matched features of a rectified pair lie at most so many rows apart (median) [px]",
+        0.5, gt=0, le=20, description="Largest median row difference of matched features in a rectified pair [px]"
     )
 
 
@@ -69,7 +68,7 @@ def check_inputs(parameters: DisparityParameters, inputs: Mapping[str, Any]) -> 
     if (parameters.lowest_disparity is None) != (parameters.levels is None):
         raise UsageError("--lowest-disparity and --levels go together", hint="give both, or neither")
     if parameters.levels is not None and parameters.levels % 16:
-        raise UsageError(f"--levels {parameters.levels} is no multiple of 16", hint="the matcher needs one")
+        raise UsageError(f"--levels {parameters.levels} is not a multiple of 16", hint="the matcher needs one")
     if parameters.block_size % 2 == 0:
         raise UsageError(f"--block-size {parameters.block_size} is even", hint="give an odd one")
 

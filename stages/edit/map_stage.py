@@ -19,8 +19,9 @@ from scenewright.stages.kit.formats.map_files import mesh_name, write_arrays
 from scenewright.stages.kit.formats.ply_files import write_ply
 from scenewright.stages.kit.stage import Context
 
-KEPT = ("counts.npz", "volume.npz", "layout.json")
-"""Which masks were seen where, the voxels, and the planes that bound the room: edits say nothing about these."""
+KEPT = ("counts.npz", "volume.npz", "free_space.npz", "layout.json")
+"""Which masks were seen where, the voxels, what was seen empty, and the planes that bound the room: edits say nothing
+about these."""
 EDITED = "mesh.ply"
 BY_A_PERSON = "a person named it"
 """Rule of a name, in because.json."""

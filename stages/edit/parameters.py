@@ -17,35 +17,32 @@ class EditMapParameters(Parameters):
     """When a thing is the one that an edit means."""
 
     minimum_overlap: float = Field(
-        0.5,
-        ge=0.1,
-        le=1,
-        description="A thing fits an edit when the boxes, grown by --margin, share this much of their union",
+        0.5, ge=0.1, le=1, description="Least IoU of a thing's box and the edit's, both grown by --margin"
     )
     minimum_part: float = Field(
-        0.25, ge=0.05, le=1, description="... or this much, and it lies in the edit's box as the only one of its class"
+        0.25, ge=0.05, le=1, description="Least such IoU of a thing that is the only one of its class in the edit's box"
     )
     margin: float = Field(
-        0.03, ge=0, le=1, description="Boxes are compared grown by this on every side [m]: flat things have no volume"
+        0.03,
+        ge=0,
+        le=1,
+        description="Margin added to boxes on every side before they are compared [m]: flat things have no volume",
     )
     reach: float = Field(
-        0.06, gt=0, le=1, description="... and when its surface comes this near to the edit's point [m]"
+        0.06, gt=0, le=1, description="Largest distance of a thing's surface from the edit's point [m]"
     )
     minimum_share: float = Field(
         0.5,
         gt=0,
         le=1,
-        description="Where the edit says points of the surface: the thing has this share of those that are of any, "
-        "and --minimum-part of all",
+        description="Of an edit with surface points: least share of the labelled ones that lie on the thing",
     )
     minimum_inside: float = Field(
-        0.5, gt=0, le=1, description="... and this share of the thing lies in the edit's box, grown by --margin"
+        0.5, gt=0, le=1, description="Least share of the thing in the edit's box, grown by --margin"
     )
-    rival_share: float = Field(
-        0.5, gt=0, le=1, description="... and no other thing has more than this share of what it has"
-    )
+    rival_share: float = Field(0.5, gt=0, le=1, description="Largest share of its points that another thing may have")
     clear_share: float = Field(
-        0.7, gt=0, le=1, description="A second thing that fits by this share of the best fit makes the edit a conflict"
+        0.7, gt=0, le=1, description="Share of the best fit from which a second thing makes the edit a conflict"
     )
 
 
@@ -53,10 +50,10 @@ class EditMasksParameters(Parameters):
     """How masks are drawn from a map."""
 
     reach: float = Field(
-        0.04, gt=0, le=1, description="A pixel is of the thing whose surface is nearest to its point, within this [m]"
+        0.04, gt=0, le=1, description="Largest distance of a pixel's point from the surface that labels it [m]"
     )
     pose_tolerance: float = Field(
-        0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
+        0.02, ge=0, description="Largest time difference between a pose of --trajectory and its frame [s]"
     )
 
 

@@ -209,7 +209,7 @@ def set_joint(state: SceneState, edit: SetJoint, fitting: Fitting) -> Done:
     upper = joint.upper if edit.upper is None else edit.upper
     value = node.joints.get(joint.name, 0.0) if edit.value is None else edit.value
     if lower >= upper:
-        raise Conflict(f"{joint.name}: {lower:.3g} to {upper:.3g} is no range")
+        raise Conflict(f"{joint.name}: {lower:.3g} to {upper:.3g} is not a range")
     if edit.value is not None and not lower <= value <= upper:
         raise Conflict(f"{joint.name}: {value:.3g} is not within {lower:.3g} to {upper:.3g}")
     value = min(max(value, lower), upper)

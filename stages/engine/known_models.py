@@ -39,4 +39,4 @@ def identify(path: Path) -> KnownModel:
     for model in known_models():
         if model.sha256 == digest:
             return model
-    raise BadInput(f"{path}: sha256 {digest[:12]}... is no network listed here", hint="see: scenewright models")
+    raise BadInput(f"{path}: sha256 {digest[:12]}... is not a network listed here", hint="see: scenewright models")

@@ -105,7 +105,9 @@ def _check_step(path: Path, pipeline: Pipeline, step: Step, stage: Stage, done: 
         if role not in stage.reads:
             raise UsageError(f"{where}: {stage.name} has no input {role!r}", hint=f"inputs: {', '.join(stage.reads)}")
         if not _VARIABLE.match(source) and source.split("/")[0] not in done:
-            raise UsageError(f"{where}: input {role!r} comes from {source!r}, which is no earlier step", hint="reorder")
+            raise UsageError(
+                f"{where}: input {role!r} comes from {source!r}, which is not an earlier step", hint="reorder"
+            )
     if step.shared and step.inputs:
         raise UsageError(f"{where}: a shared step has no inputs", hint="leave `shared` out")
     missing = [role for role in stage.required() if role not in step.inputs]

@@ -26,20 +26,20 @@ class EvaluateParameters(Parameters):
     """How predictions are matched with the truth."""
 
     label_distance: float = Field(
-        0.05, gt=0, le=1, description="A true point takes the label of the nearest map vertex within this distance [m]"
+        0.05, gt=0, le=1, description="Largest distance of a true point from the map vertex that labels it [m]"
     )
-    match_iou: float = Field(
-        0.5, ge=0.5, lt=1, description="Segments and boxes match above this intersection over union"
-    )
+    match_iou: float = Field(0.5, ge=0.5, lt=1, description="IoU above which segments and boxes match")
     node_match_iou: float = Field(
-        0.25, gt=0, lt=1, description="A graph node may be the same entity as a true one from this overlap (IoU) on"
+        0.25, gt=0, lt=1, description="Least IoU of a graph node and the true node that it may match"
     )
-    mesh_threshold: float = Field(0.05, gt=0, description="Distance that counts as reconstructed [m]")
+    mesh_threshold: float = Field(
+        0.05, gt=0, description="Largest distance of reconstructed surface from the truth [m]"
+    )
     minimum_visible_points: int = Field(
         40, ge=1, description="True entities with fewer visible points (1 cm grid) are optional: neither hit nor miss"
     )
     thesis_minimum_area: float = Field(
-        0.1, ge=0, description="The thesis's variant drops segments below this area (1000 points of 1 cm) [m^2]"
+        0.1, ge=0, description="Smallest segment of the thesis's variant (1000 points of 1 cm) [m^2]"
     )
     bootstrap_resamples: int = Field(2000, ge=100, le=100000, description="Resamples of the percentile bootstrap")
     plots: bool = Field(True, description="Draw the plots")

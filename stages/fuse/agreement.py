@@ -12,13 +12,14 @@ import numpy as np
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
 from scenewright.stages.fuse.belief import doubted, flush_shares
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
+from scenewright.stages.fuse.joining import joined
 from scenewright.stages.fuse.layout.evidence import Scene
 from scenewright.stages.fuse.layout.room import CEILING, FLOOR, WALL, Layout, find_layout
 from scenewright.stages.fuse.looks import Looks
 from scenewright.stages.fuse.pieces import Cloud, grown_things, pieces_beside
 from scenewright.stages.fuse.relabelling import relabelled
 from scenewright.stages.fuse.surface import Surface
-from scenewright.stages.fuse.testimony import BOUND, GROWN, PIECE, Reason, with_names
+from scenewright.stages.fuse.testimony import BOUND, GROWN, JOINED, PIECE, Reason, with_names
 from scenewright.stages.fuse.votes import Votes
 
 SURE = 0.5
@@ -86,8 +87,15 @@ def agreed(
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
-    said = looks.said_of(scene.vertices, labels.instance)
-    named, labels, reasons = with_names(kept, labels, shapes, said, vocabulary, things)
+    points = looks.on(scene.vertices, labels.instance)
+    may_join = frozenset(entity.instance for entity in kept if entity.class_id in things)
+    parts = joined(scene, labels.instance, may_join, points, voxel)
+    if parts:
+        whole = np.array([parts.get(k, k) for k in range(int(labels.instance.max(initial=0)) + 1)], np.int32)
+        kept, labels = relabelled(surface, kept, labels, whole[labels.instance], {})
+        points = [(mask, whole[thing]) for mask, thing in points]
+        shapes |= dict.fromkeys(parts.values(), JOINED)
+    named, labels, reasons = with_names(kept, labels, shapes, looks.said_of(points), vocabulary, things)
     return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
 
 

@@ -326,7 +326,7 @@ def _scan(
 def _whole(labels: np.ndarray, path: Path) -> np.ndarray:
     integers = np.asarray(labels).reshape(-1).astype(np.int64)
     if (integers != np.asarray(labels).reshape(-1)).any() or (integers < 0).any():
-        raise BadInput(f"{path}: labels that are no integers from 0 on", hint=HINT)
+        raise BadInput(f"{path}: labels that are not integers from 0 on", hint=HINT)
     return integers
 
 
@@ -347,5 +347,5 @@ def _json(path: Path) -> dict[str, Any]:
 def _integers(row: Mapping[str, Any], key: str, path: Path) -> np.ndarray:
     values = row.get(key)
     if not isinstance(values, list) or not all(type(value) is int and abs(value) < 2**31 for value in values):
-        raise BadInput(f"{path}: `{key}` is no list of integers", hint=HINT)
+        raise BadInput(f"{path}: `{key}` is not a list of integers", hint=HINT)
     return np.array(values, dtype=np.int64)

@@ -56,6 +56,19 @@ class FreeSpace:
         cells = np.floor(np.asarray(points, float) / CELL).astype(np.int64)
         return _look_up(cells, self._keys, self._slots, self.frames) >= FEWEST
 
+    def as_arrays(self) -> dict[str, np.ndarray]:
+        """Return the cells that enough frames saw through, in canonical order: block_coordinates (B, 3) int32, `free`
+        (B, 64) uint8, a bit for each of 8^3 cells of a block, x fastest, lowest bit first, and the `edge` (1,) of one
+        [m]. Blocks without such a cell are left out."""
+        free = self.frames[: self.count] >= FEWEST
+        kept = np.flatnonzero(free.any(axis=1))
+        kept = kept[np.lexsort(self.coordinates[kept].T)]
+        return {
+            "block_coordinates": self.coordinates[kept],
+            "free": np.packbits(free[kept], axis=1, bitorder="little"),
+            "edge": np.array([CELL]),
+        }
+
     def _append(self, keys: np.ndarray) -> None:
         first, self.count = self.count, self.count + len(keys)
         if self.count > len(self.coordinates):

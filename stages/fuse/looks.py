@@ -72,29 +72,39 @@ class Looks:
         if len(self.kept) > KEPT:
             self.kept, self.every = self.kept[::2], 2 * self.every
 
-    def said_of(self, vertices: np.ndarray, instance: np.ndarray) -> dict[int, Said]:
-        """Return by instance what was said of it. vertices (V, 3) [m], instance (V,), 0 none."""
-        if not self.kept or not len(vertices):
-            return {}
+    def said_of(self, points: Sequence[tuple[np.ndarray, np.ndarray]]) -> dict[int, Said]:
+        """Return by instance what was said of it. `points`: per look the mask and the instance of each, from `on`."""
+        looks: dict[int, int] = defaultdict(int)
+        scores: dict[int, dict[int, float]] = defaultdict(lambda: defaultdict(float))
+        for look, (mask, thing) in zip(self.kept, points, strict=True):
+            seen, spoken = spoken_of(mask, thing, len(look.said))
+            for k in seen:
+                looks[k] += 1
+            for number, k in spoken.items():
+                class_id, score = look.said[number - 1]
+                scores[k][class_id] += score
+        return {
+            k: Said(float(n), {c: min(score / n, 1.0) for c, score in sorted(scores[k].items())})
+            for k, n in sorted(looks.items())
+        }
+
+    def on(self, vertices: np.ndarray, instance: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return per look the mask (N,) of every point and the instance (N,) that it lies on, 0 none.
+
+        vertices (V, 3) [m], instance (V,), 0 none.
+        """
+        if not self.kept:
+            return []
+        if not len(vertices):
+            return [(look.mask, np.zeros(len(look.mask), np.int64)) for look in self.kept]
         ends = np.cumsum([len(look.mask) for look in self.kept])
         cells, cell_of = np.unique(np.concatenate([look.voxel for look in self.kept]), axis=0, return_inverse=True)
         near, nearest = cKDTree(vertices).query(
             (cells + 0.5) * self.voxel_size, distance_upper_bound=REACH * self.voxel_size
         )
         of_cell = np.where(np.isfinite(near), instance[np.minimum(nearest, len(instance) - 1)], 0)
-        looks: dict[int, int] = defaultdict(int)
-        scores: dict[int, dict[int, float]] = defaultdict(lambda: defaultdict(float))
-        for look, thing in zip(self.kept, np.split(of_cell[cell_of.ravel()], ends[:-1]), strict=True):
-            seen, spoken = spoken_of(look.mask, thing, len(look.said))
-            for k in seen:
-                looks[k] += 1
-            for mask, k in spoken.items():
-                class_id, score = look.said[mask - 1]
-                scores[k][class_id] += score
-        return {
-            k: Said(float(n), {c: min(score / n, 1.0) for c, score in sorted(scores[k].items())})
-            for k, n in sorted(looks.items())
-        }
+        things = np.split(of_cell[cell_of.ravel()], ends[:-1])
+        return [(look.mask, thing) for look, thing in zip(self.kept, things, strict=True)]
 
 
 def look_of(

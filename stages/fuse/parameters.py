@@ -24,89 +24,80 @@ class FuseParameters(Parameters):
 
     voxel_size: float = Field(0.02, ge=0.001, le=1, description="TSDF voxel edge [m]")
     truncation_voxels: float = Field(4.0, ge=1, le=32, description="Truncation distance [voxels]")
-    minimum_depth: float = Field(0.1, ge=0.01, description="Nearer depth is not used [m]")
-    maximum_depth: float = Field(4.0, gt=0.01, description="Farther depth is not used [m]")
-    maximum_weight: float = Field(1000.0, gt=0, le=60000, description="Weight at which a voxel starts to forget")
-    every: int = Field(1, ge=1, description="Integrate every how many-th frame")
-    block_stride: int = Field(4, ge=1, le=16, description="Every how many-th pixel looks for voxel blocks")
+    minimum_depth: float = Field(0.1, ge=0.01, description="Minimum depth [m]")
+    maximum_depth: float = Field(4.0, gt=0.01, description="Maximum depth [m]")
+    maximum_weight: float = Field(
+        1000.0, gt=0, le=60000, description="Maximum weight of a voxel; older observations fade beyond it"
+    )
+    every: int = Field(1, ge=1, description="Integrate every n-th frame")
+    block_stride: int = Field(4, ge=1, le=16, description="Pixel stride of the search for voxel blocks")
     snapshot_every: int = Field(
-        0, ge=0, description="Keep the map as it is after every so many frames, for graphs that grow with it (0: never)"
+        0, ge=0, description="Keep a snapshot of the map every n frames, for `timeline` (0: never)"
     )
     pose_tolerance: float = Field(
-        0.02, ge=0, description="A pose of --trajectory belongs to the frame at most this far from its time [s]"
+        0.02, ge=0, description="Largest time difference between a pose of --trajectory and its frame [s]"
     )
 
     label_band: float = Field(
         0.4,
         gt=0,
         le=1,
-        description="Voxels within this share of the truncation distance vote (1 in the thesis's code, which widens "
-        "flat things by it)",
+        description="Band in which voxels are labelled, as a share of the truncation distance (thesis: 1)",
     )
-    overlap_stride: int = Field(2, ge=1, le=16, description="Every how many-th pixel measures overlap with the map")
+    overlap_stride: int = Field(2, ge=1, le=16, description="Pixel stride of the overlap with the map")
     minimum_overlap_voxels: int = Field(
-        8, ge=1, description="Smaller overlaps, and smaller frame segments, are not matched [voxels]"
+        8, ge=1, description="Smallest overlap, and frame segment, that is matched [voxels]"
     )
     minimum_overlap_share: float = Field(
-        0.1, ge=0, le=1, description="A frame segment is matched where this share of its voxels agrees"
+        0.1, ge=0, le=1, description="Least share of a frame segment's voxels that agree with its match"
     )
 
     merging: Literal["ours", "thesis", "separate"] = Field(
         "ours",
-        description="`thesis` merges segment labels that lie in one frame segment, whatever they are; `ours` only when "
-        "they are of that segment's class and more often together than apart; it also merges instances that frames saw "
-        "as one, and makes every stuff class one instance; `separate` counts classes and instances apart and merges no "
-        "instances, as Voxblox++ does and the thesis without joint fusion",
+        description="`thesis`: segment labels of one frame segment merge; `ours`: only those of its class "
+        "that are more often together than apart, and instances seen as one; `separate`: no "
+        "instances merge (Voxblox++)",
     )
     merge_overlap_share: float = Field(
-        0.2, gt=0, le=1, description="Two segment labels share a frame segment when each fills this share of it"
+        0.2, gt=0, le=1, description="Least share of a frame segment that each of two labels fills when they share it"
     )
-    merge_minimum_frames: int = Field(3, ge=1, description="... and are merged after so many frame segments")
+    merge_minimum_frames: int = Field(3, ge=1, description="Shared frame segments after which two labels merge")
     instance_minimum_frames: int = Field(
-        2, ge=1, description="`ours` also merges things that frames saw as one so often, and less often as two"
+        2, ge=1, description="`ours`: frames that see two things as one, more than see them as two, before these merge"
     )
     instance_threshold: float = Field(0.5, gt=0, le=1, description="m_th of eq. 2.5")
-    instance_minimum_count: int = Field(10, ge=0, description="Things merge only above this common count")
-    regularize_every: int = Field(10, ge=1, description="Instances are merged every how many-th frame, and at the end")
+    instance_minimum_count: int = Field(10, ge=0, description="Common count above which instances merge")
+    regularize_every: int = Field(10, ge=1, description="Merge instances every n-th frame, and at the end")
 
     minimum_weight: float = Field(
-        0.1, ge=0, description="Surfaces are drawn through voxels of at least this weight (a frame at depth z: 1/z^2)"
+        0.1, ge=0, description="Minimum voxel weight of the extracted surface (a frame at depth z: 1/z^2)"
     )
     smoothing: float = Field(
-        0.2,
-        ge=0,
-        description="Weight of a voxel's neighbours when surfaces are drawn; well observed voxels keep theirs",
+        0.2, ge=0, description="Smoothing of the TSDF before surface extraction: weight of a voxel's neighbours"
     )
-    minimum_entity_voxels: int = Field(20, ge=1, description="Entities of fewer surface voxels are dropped")
+    minimum_entity_voxels: int = Field(20, ge=1, description="Smallest entity that is kept [surface voxels]")
     minimum_observations: int = Field(
-        3,
-        ge=1,
-        description="Entities that fewer frames voted for are dropped; a tenth of the frames where that is less",
+        3, ge=1, description="Fewest frames that vote for an entity; a tenth of the frames where that is less"
     )
     minimum_prediction_share: float = Field(
-        0.15,
-        ge=0,
-        le=1,
-        description="Segments that are background in more than the rest of their frames stay "
-        "unlabelled (0: the thesis, in which the background has no vote)",
+        0.15, ge=0, le=1, description="Least share of a segment's frames in which it is no background (thesis: 0)"
     )
     spread_steps: int = Field(
-        2, ge=0, description="Unlabelled vertices take the label of the smooth surface around them, so many times"
+        2, ge=0, description="Iterations in which unlabelled vertices take the label of the smooth surface around them"
     )
     speck_share: float = Field(
-        0.05,
-        ge=0,
-        lt=1,
-        description="Parts of a thing under this share of its largest part take the label of what surrounds them",
+        0.05, ge=0, lt=1, description="Smallest part of a thing that keeps its label, as a share of its largest part"
     )
     piece_share: float = Field(
-        0.2, ge=0, lt=1, description="Things under this share of one of their class that they touch are a part of it"
+        0.2,
+        ge=0,
+        lt=1,
+        description="Size of a thing, as a share of one of its class that it touches, under which it is a part of that",
     )
     unnamed_area: float = Field(
         0.2,
         ge=0,
-        description="`ours`: surface that no mask names, stands free of walls and has this area is an `object` in one "
-        "piece [m^2] (0: it stays surroundings)",
+        description="`ours`: smallest free-standing unlabelled surface that becomes an `object` [m^2] (0: none does)",
     )
     unit: Literal["declared", UnitName] = Field(
         "declared", description="Unit of the file of --from-mesh, whatever it declares (a scan declares none: metres)"
@@ -115,7 +106,9 @@ class FuseParameters(Parameters):
         "declared", description="Axis of --from-mesh that points up, whatever its file declares (GLB: +y; others: +z)"
     )
     part_distance: float = Field(
-        0.2, gt=0, description="Parts of a thing farther than this from its largest part are left unlabelled [m]"
+        0.2,
+        gt=0,
+        description="Largest distance of a thing's parts from its largest part; farther ones are unlabelled [m]",
     )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.stages.fuse.closing import ClosedMap
+from scenewright.stages.fuse.free_space import FreeSpace
 from scenewright.stages.fuse.voxel_blocks import FIXED_POINT, VoxelBlocks
 from scenewright.stages.kit.formats.map_files import mesh_name, write_arrays
 from scenewright.stages.kit.formats.ply_files import ColoredMesh, write_ply
@@ -37,11 +38,13 @@ def write_meshes(root: Path, closed: ClosedMap) -> None:
         write_ply(root / mesh_name(entity.instance), entity.mesh)
 
 
-def write_payload(root: Path, closed: ClosedMap, blocks: VoxelBlocks) -> None:
-    """Write every file of schemas/panoptic_map.py under `root`."""
+def write_payload(root: Path, closed: ClosedMap, blocks: VoxelBlocks, free_space: FreeSpace | None) -> None:
+    """Write every file of schemas/panoptic_map.py under `root`. `free_space`: None of maps of other rules than ours."""
     write_meshes(root, closed)
     labelled = closed.labelled
     labels = {"instance": labelled.instance, "segment": labelled.segment, "class_id": labelled.class_id}
     write_arrays(root / "mesh_labels.npz", labels)
     write_arrays(root / "counts.npz", closed.counts.as_arrays())
     write_arrays(root / "volume.npz", volume_arrays(blocks, closed.merged))
+    if free_space is not None:
+        write_arrays(root / "free_space.npz", free_space.as_arrays())

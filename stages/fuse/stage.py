@@ -87,7 +87,7 @@ def write_map(
     by reason."""
     closed = close_map(mapper, vocabulary, label, context.progress)
     with context.progress.step("write the map"):
-        write_payload(context.output, closed, mapper.blocks)
+        write_payload(context.output, closed, mapper.blocks, mapper.free_space)
     summary: dict[str, str | float] = {
         "frames": mapper.frames_integrated,
         **{f"skipped_{reason}": count for reason, count in sorted(skipped.items())},

@@ -17,6 +17,7 @@ from scenewright.stages.kit.class_extents import extent_of
 BY_MASKS = "masks"
 GROWN = "masks, and the piece of which they have a part"
 PIECE = "a piece that geometry cuts"
+JOINED = "parts that masks take for one"
 BOUND = "planes that bound the room"
 BY_MOST_LOOKS = "masks of the class, in most looks"
 """How the surface of an entity was found."""

@@ -27,6 +27,8 @@ HIDDEN_FACTOR = 0.8
 """A plane that nobody saw is worth less than the same plane seen."""
 BURIED_FACTOR = 0.6
 """A hidden plane in the middle of an object (the seat under a pile of clothes) is worth less again."""
+SUNK_SHARE = 0.5
+"""Most of its height by which a thing may seem to go through the top on which it stands."""
 BOARD_FACTOR = 0.8
 """Share of a container that a board, of which a part was seen, is supposed to span."""
 FLOOR_FACTOR = 0.9
@@ -97,7 +99,7 @@ def seen_candidate(child: Entity, parent: Entity, k: int, parameters: GraphParam
     gap = height_gap(child.box, patch)
     # A plane through the child's body does not carry it: without this, what is left of a chair pushed under a table
     # (its back) would hang on the table top.
-    if gap < -parameters.maximum_sinking:
+    if gap < deepest_gap(child, parent, parameters):
         return None
     if child.class_name in parameters.wall_classes and gap > parameters.floating_gap:
         return None
@@ -127,10 +129,24 @@ def seen_candidate(child: Entity, parent: Entity, k: int, parameters: GraphParam
         score *= MOVABLE_FACTOR
     if parent.node_type == "layout" and parent.class_name != "floor":
         score *= LEDGE_FACTOR
+    if gap < -parameters.maximum_sinking:
+        score *= BURIED_FACTOR
     if score < parameters.minimum_score:
         return None
     relation: Literal["supports", "contains"] = "contains" if inside else "supports"
     return Candidate(child.name, parent.name, score, relation, gap, overlap, height, k, touching=touching)
+
+
+def deepest_gap(child: Entity, parent: Entity, parameters: GraphParameters) -> float:
+    """Return the least gap [m], negative, at which a top of the parent may still carry the child.
+
+    Below a top of dark stone or gloss a camera sees mirrored and scattered depth: what nobody named may seem to begin
+    below the top on which it stands, as long as most of it is above.
+    """
+    sinking = parameters.maximum_sinking
+    if child.class_name == NAMELESS and parent.node_type != "layout" and not parent.movable:
+        sinking = max(sinking, SUNK_SHARE * (child.top - child.bottom))
+    return -sinking
 
 
 def hidden_candidate(child: Entity, parent: Entity, parameters: GraphParameters) -> Candidate | None:
@@ -187,10 +203,10 @@ def continued_candidate(
     wall behind. Where a top does end, a camera above it sees what is lower. So the top goes on within the parent's box
     where nothing lower was seen: in `area_threshold` of the child's footprint at least.
     """
-    tops = []
+    tops, deepest = [], deepest_gap(child, parent, parameters)
     for patch in (parent.patches[k] for k in parent.supporting):
         gap = height_gap(child.box, patch)
-        if not patch.plane.hidden and -parameters.maximum_sinking <= gap <= HIDDEN_TOP_DISTANCE:
+        if not patch.plane.hidden and deepest <= gap <= HIDDEN_TOP_DISTANCE:
             tops.append((patch.plane.area, gap))
     if not tops or child.class_name in parameters.wall_classes:
         return None
@@ -200,7 +216,7 @@ def continued_candidate(
         return None
     height = child.bottom - gap
     share = inside_share(child.box, parent.box) - seen_lower(child, height, entities)
-    score = HIDDEN_FACTOR * support_score(gap, share)
+    score = HIDDEN_FACTOR * support_score(gap, share) * (BURIED_FACTOR if gap < -parameters.maximum_sinking else 1.0)
     if share < parameters.area_threshold or score < parameters.minimum_score:
         return None
     patch = level_patch(outline, height, hidden=True)

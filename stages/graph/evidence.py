@@ -1,4 +1,4 @@
-"""What speaks for a relation: the plane, the gap, the overlap, and where the two meet (docs/GRAPH.md)."""
+"""What speaks for a relation: the plane, the gap, the overlap, and where the two meet (docs/SCENES.md)."""
 
 from __future__ import annotations
 

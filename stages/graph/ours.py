@@ -1,4 +1,4 @@
-"""Ours: the thesis's contact graph with what a map of a real room asks for beside (docs/GRAPH.md)."""
+"""Ours: the thesis's contact graph with what a map of a real room asks for beside (docs/SCENES.md)."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from scenewright.schemas.scene_parts import Box, Relation
 from scenewright.schemas.vocabulary import UNNAMED, SemanticClass
+from scenewright.stages.graph.balance import TOUCH
 from scenewright.stages.graph.beside import relations_beside
-from scenewright.stages.graph.corrected_support import HIDDEN_TOP_DISTANCE, candidates_for
+from scenewright.stages.graph.corrected_support import HIDDEN_TOP_DISTANCE, candidates_for, hull_overlap
 from scenewright.stages.graph.hanging import hanging_candidate
-from scenewright.stages.graph.nodes import Entity, SmallSupports
+from scenewright.stages.graph.nodes import Entity, Patch, SmallSupports
 from scenewright.stages.graph.observed_box import BoxFit, observed_box
 from scenewright.stages.graph.parameters import GraphParameters
-from scenewright.stages.graph.shared_support import shared_candidates
-from scenewright.stages.graph.support import Candidate
+from scenewright.stages.graph.shared_support import PART_SHARE, shared_candidates
+from scenewright.stages.graph.support import Candidate, height_gap
+from scenewright.stages.graph.touching import touches
 from scenewright.stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
 from scenewright.stages.graph.walls import search_trees, wall_candidate
-from scenewright.stages.kit.geometry.boxes import box_volume, boxes_overlap_volume
+from scenewright.stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, points_in_box
+from scenewright.stages.kit.geometry.steadiness import stands_steadily
 
 LEDGE_AREA = 0.05
 """Least area of a supporting surface in a wall entity [m^2]."""
@@ -25,6 +28,8 @@ LEDGE_GAP = 0.2
 """Gap between supporting surfaces of one wall entity [m]."""
 PIECE_SHARE = 0.7
 """Share of its box that a piece has within the whole."""
+BOARD, SLENDER = 0.08, 0.25
+"""Boards, posts and bars of furniture are thinner than this [m], and than this share of their length; by eye."""
 MOVABLE_REACH = 1 / 3
 """Movable things have to be this much nearer to a wall to hang on it."""
 
@@ -102,17 +107,41 @@ def fragments(entities: list[Entity]) -> dict[str, str]:
 
     Furniture of one class does not interpenetrate, so a chair whose box lies within the box of a larger chair is a
     part of it that the map failed to merge. Small things of one class do lie in each other (bowls, boxes), and what
-    nobody named need be of no one class: a coffee machine lies within the box of what stands around it.
+    nobody named need be of no one class: a coffee machine lies within the box of what stands around it. It is a piece
+    where it is a board or a post that would fall by itself (`is_loose_board`).
     """
     whole_of: dict[str, str] = {}
     for piece in entities:
-        if piece.movable or piece.node_type == "layout" or piece.class_name == UNNAMED:
+        if piece.movable or piece.node_type == "layout":
             continue
         for whole in entities:
-            if whole.class_name != piece.class_name or len(whole.points) <= len(piece.points):
+            if len(whole.points) <= len(piece.points) or piece.name in whole_of or whole.node_type == "layout":
                 continue
-            shared = boxes_overlap_volume(piece.box, whole.box)
-            if shared >= PIECE_SHARE * box_volume(piece.box) and whole.name not in whole_of:
-                whole_of[piece.name] = whole.name
-                break
+            if piece.class_name == UNNAMED:
+                if is_loose_board(piece, whole, entities):
+                    whole_of[piece.name] = whole.name
+            elif whole.class_name == piece.class_name:
+                shared = boxes_overlap_volume(piece.box, whole.box)
+                if shared >= PIECE_SHARE * box_volume(piece.box):
+                    whole_of[piece.name] = whole.name
     return whole_of
+
+
+def is_loose_board(piece: Entity, whole: Entity, entities: list[Entity]) -> bool:
+    """Whether a thing without a name is a board, a post or a bar that lies in the box of another one, and that would
+    fall by itself: it touches nothing that would carry it, and would not even stand if something did."""
+    least, most = min(piece.box.size), max(piece.box.size)
+    if least > min(BOARD, SLENDER * most) or max(whole.box.size) <= most:
+        return False
+    if points_in_box(whole.box, piece.points, margin=TOUCH).mean() < PIECE_SHARE:
+        return False
+    touched = (patch for entity in entities if entity is not piece for patch in carriers_touched(piece, entity))
+    if any(hull_overlap(patch.hull, piece.box) >= PART_SHARE for patch in touched):
+        return False
+    return not stands_steadily([piece.points], piece.bottom)
+
+
+def carriers_touched(child: Entity, parent: Entity) -> list[Patch]:
+    """Return the level patches of an entity that end at the bottom of another one."""
+    patches = [parent.patches[k] for k in parent.supporting]
+    return [patch for patch in patches if touches(height_gap(child.box, patch))]

@@ -25,46 +25,42 @@ class GraphParameters(Parameters):
         0.5, ge=0.0, le=1.0, description="b_th: least share of the child's footprint over the supporting plane"
     )
     minimum_score: float = Field(0.2, ge=0.0, le=1.0, description="Least score (2.3) of a supporting relation")
-    point_spacing: float = Field(0.01, ge=0.001, description="Grid to which meshes are thinned for plane search [m]")
+    point_spacing: float = Field(
+        0.01, ge=0.001, description="Grid on which meshes are downsampled for plane detection [m]"
+    )
     plane_distance: float = Field(
         0.03, gt=0.0, description="RANSAC inlier distance, at most a quarter of the box's smallest edge [m]"
     )
     plane_iterations: int = Field(200, ge=1, description="RANSAC hypotheses per plane")
     normal_weight: float = Field(0.1, ge=0.0, le=1.0, description="Weight of normals in the RANSAC inlier rule")
-    plane_share: float = Field(
-        0.1, gt=0.0, le=1.0, description="Planes with a smaller share of an entity's points are dropped"
-    )
-    minimum_support_area: float = Field(
-        0.004, gt=0.0, description="ours: smaller horizontal patches than this are no supporting planes [m^2]"
-    )
+    plane_share: float = Field(0.1, gt=0.0, le=1.0, description="Smallest plane, as a share of an entity's points")
+    minimum_support_area: float = Field(0.004, gt=0.0, description="ours: smallest horizontal supporting plane [m^2]")
     stray_share: float = Field(
-        0.05, ge=0.0, lt=1.0, description="Clusters with a smaller share of an entity's points are left out of its box"
+        0.05, ge=0.0, lt=1.0, description="Smallest cluster in an entity's box, as a share of its points"
     )
-    box_trim: float = Field(
-        0.01, ge=0.0, lt=0.25, description="ours: share of the points left out at both ends of a box's axes"
-    )
+    box_trim: float = Field(0.01, ge=0.0, lt=0.25, description="ours: quantile trimmed at both ends of a box's axes")
     side_share: float = Field(
         0.5,
         gt=0.0,
         le=1.0,
-        description="ours: a box turns with its sides where this share of them agrees modulo 90 degrees",
+        description="ours: least share of side normals that agree, modulo 90 degrees, on a box's yaw",
     )
     round_classes: tuple[str, ...] = Field(
         ("bottle", "bowl", "cup", "vase", "lamp", "bin", "plant"),
-        description="ours: classes of which the normals of the sides may say that they are round",
+        description="ours: classes that side normals may show to be round",
     )
     stray_distance: float = Field(0.1, gt=0.0, description="Gap that separates clusters [m]")
     maximum_sinking: float = Field(
-        0.05, ge=0.0, description="ours: planes farther above the child's bottom than this do not support it [m]"
+        0.05, ge=0.0, description="ours: largest height of a supporting plane over the child's bottom [m]"
     )
     tie_margin: float = Field(
-        0.1, ge=0.0, le=1.0, description="ours: among scores this close to the best the highest plane wins"
+        0.1, ge=0.0, le=1.0, description="ours: score difference within which the highest plane wins"
     )
     maximum_extension: float = Field(
-        1.0, ge=0.0, description="Boxes are extended down to the supporting plane by at most this [m]"
+        1.0, ge=0.0, description="Largest extension of a box down to its supporting plane [m]"
     )
     wall_distance: float = Field(
-        0.12, ge=0.0, description="Objects without support hang on a wall that is at most this far from their mesh [m]"
+        0.12, ge=0.0, description="Largest distance of an unsupported object's mesh from the wall that it hangs on [m]"
     )
     wall_classes: tuple[str, ...] = Field(
         ("wall_cabinet", "wall_shelf", "clock", "picture", "monitor", "shelf", "lamp", "pendant_lamp"),
@@ -72,15 +68,13 @@ class GraphParameters(Parameters):
     )
     floating_gap: float = Field(0.15, ge=0.0, description="ours: gap above which `wall_classes` count as floating [m]")
     movable_gap: float = Field(
-        0.3, ge=0.0, description="ours: movable things farther above a plane than this do not stand on it [m]"
+        0.3, ge=0.0, description="ours: largest gap between a movable thing and the plane that it stands on [m]"
     )
-    minimum_points: int = Field(
-        30, ge=1, description="Entities with fewer points on the thinning grid are dropped (small-entity filter)"
-    )
-    minimum_diagonal: float = Field(0.03, ge=0.0, description="Entities with a smaller box diagonal are dropped [m]")
+    minimum_points: int = Field(30, ge=1, description="Fewest points of an entity on the grid (small-entity filter)")
+    minimum_diagonal: float = Field(0.03, ge=0.0, description="Smallest box diagonal of an entity [m]")
     dropped_classes: tuple[str, ...] = Field(("person",), description="Classes that are no part of a static scene")
     minimum_floor_area: float = Field(
-        0.5, gt=0.0, description="Unlabelled surface at z = 0 from which a missing floor is supposed [m^2]"
+        0.5, gt=0.0, description="Unlabelled surface at z = 0 from which a missing floor is assumed [m^2]"
     )
 
 

@@ -89,7 +89,7 @@ def refuse_logs_within(root: Path) -> None:
         return
     listed = ", ".join(logs[:SHOWN]) + (", ..." if len(logs) > SHOWN else "")
     what = f"a log in {logs[0]}" if len(logs) == 1 else f"{len(logs)} logs, {listed}"
-    raise BadInput(f"{root}: is no log, but holds {what}", hint=f"give {root / logs[0]}")
+    raise BadInput(f"{root}: is not a log, but holds {what}", hint=f"give {root / logs[0]}")
 
 
 def _check_topics(layout: LogLayout, parameters: IngestParameters, path: Path) -> None:

@@ -36,7 +36,7 @@ class IngestParameters(Parameters):
         "as-is",
         description="How 16-bit depth is stored: as it is, two bytes exchanged, or bits rotated by three (SUN3D)",
     )
-    frame_rate: float = Field(30.0, gt=0, description="Rate assumed for folders whose images carry no time [1/s]")
+    frame_rate: float = Field(30.0, gt=0, description="Frame rate of folders whose images have no time stamps [1/s]")
     every: int = Field(1, ge=1, description="Use every n-th frame of the log")
     start: int = Field(0, ge=0, description="First frame of the log to use")
     stop: int | None = Field(None, ge=0, description="Frame of the log to stop before")
@@ -47,26 +47,24 @@ class IngestParameters(Parameters):
     maximum_transform_gap: float = Field(
         0.5, gt=0, description="Largest gap between transforms that a pose is interpolated over [s]"
     )
-    maximum_depth: float | None = Field(None, gt=0, description="Depth beyond this becomes invalid [m]")
+    maximum_depth: float | None = Field(None, gt=0, description="Maximum depth; depth beyond it becomes invalid [m]")
     register_color: bool = Field(
-        True,
-        description="Resample the colour of 7-Scenes Kinect logs (640x480, focal length 585) into the depth camera, "
-        "from which it was recorded 3 cm apart",
+        True, description="Register the colour of 7-Scenes Kinect logs (640x480, focal length 585) to the depth camera"
     )
     turn: bool = Field(
-        True, description="Turn recordings of phones whose pictures lie on their side, where the log says what is up"
+        True, description="Turn phone recordings in portrait upright, where the log has the gravity direction"
     )
     gravity: Literal["auto", "given", "floor", "imu", "camera-up", "none"] = Field(
         "auto",
-        description="How the world is made upright: auto takes what the log says, else the floor, else what an IMU "
-        "measured, else the mean camera up; given takes the axis named by up",
+        description="Gravity direction: auto takes the log's, else the floor's normal, the IMU's, or the mean "
+        "camera up; given takes --up",
     )
     up: Literal["x", "-x", "y", "-y", "z", "-z"] = Field("z", description="Up axis of the log's world, with given")
     baseline: float | None = Field(
         None,
         gt=0,
         le=10,
-        description="Distance of the right eye along +x [m], whatever a calibration says of its sign and unit",
+        description="Stereo baseline, right camera along +x [m]; overrides the calibration's sign and unit",
     )
     camera: tuple[str, ...] = Field(
         (), description="Camera of the log to use, by name, for logs with several; 'all' takes every one"
@@ -85,7 +83,7 @@ class IngestParameters(Parameters):
     )
     world_frame: str | None = Field(None, description="Frame that poses are wanted in; default: root of the tree")
     register_depth: bool = Field(
-        True, description="Carry depth into the colour camera where the log says how the two stand to each other"
+        True, description="Register depth to the colour camera where the log has the extrinsics of the two"
     )
     damage: Literal["salvage", "refuse"] = Field(
         "salvage",

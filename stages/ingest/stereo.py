@@ -45,8 +45,7 @@ def in_metres(baseline: float, where: str) -> tuple[float, str | None]:
     low, high = UNCLEAR
     if low <= length < high:
         raise BadInput(
-            f"{where}: by the calibration the eyes stand {length:.4g} apart, too far for metres: centimetres, or "
-            "millimetres?",
+            f"{where}: the calibration's baseline is {length:.4g}, too long for metres: centimetres, or millimetres?",
             hint=f"{others}, --baseline {length / 1000:.4g} if in millimetres",
         )
     return baseline / 1000, f"WARNING: baseline of {length:.4g} taken as millimetres ({others})"
@@ -99,7 +98,9 @@ def stereo_lenses(
     for calibration, size, flat, name in zip(calibrations, sizes, rectified, names, strict=True):
         turn = np.eye(3) if flat or len(calibration.R) != 9 else np.array(calibration.R, dtype=float).reshape(3, 3)
         if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-3:
-            raise BadInput(f"{where}: R of the calibration of {name} is no rotation", hint="calibrate the pair again")
+            raise BadInput(
+                f"{where}: R of the calibration of {name} is not a rotation", hint="calibrate the pair again"
+            )
         lenses.append(turned_lens(calibration, size, flat, camera, turn, where, name))
     return lenses[0], lenses[1], baseline
 

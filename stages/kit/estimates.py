@@ -1,7 +1,7 @@
 """What a step is going to write and to use, declared beside its parameters as measured ratios and honest bounds.
 
 The figures were measured on demo runs (24 frames of 240x180 to 120 of 640x480, voxels of 4, 2 and 1 cm) and on real
-logs (docs/HOUSEKEEPING.md). What nobody knows before, such as how much surface was seen, makes the lower bound far
+logs (docs/EDIT.md). What nobody knows before, such as how much surface was seen, makes the lower bound far
 less than what is expected, and only that bound stops a run.
 """
 

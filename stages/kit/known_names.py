@@ -15,4 +15,4 @@ def check_names(option: str, names: Sequence[str], known: Sequence[str]) -> None
     """Raise UsageError for the first of an option's names that is not known."""
     for name in names:
         if name not in known:
-            raise UsageError(f"{option}: there is no {name!r}", hint=f"choose of {', '.join(known)}")
+            raise UsageError(f"{option}: there is no {name!r}", hint=f"choose one of {', '.join(known)}")

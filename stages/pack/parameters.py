@@ -47,9 +47,8 @@ class PackParameters(LanguageParameters):
     instance: int = Field(0, ge=0, le=2**31, description="Number of the problem in the suite: its seed")
     proposer: ProposerName = Field(
         "ours",
-        description="Who proposes plans: `ours` (geometry and typed feedback, no language model); a language model as "
-        "`backtrack` or `scratch` (LLM3's variants, all numbers by the model) or `symbolic` (its order, our geometry); "
-        "samplers that read no reasons",
+        description="Who proposes plans: `ours` (geometry and feedback); a language model: `backtrack`, "
+        "`scratch` (LLM3) or `symbolic` (its order, our geometry); or samplers without feedback",
     )
     reasons: bool = Field(True, description="The proposer sees why an action failed, not only that it did")
     trace_length: int = Field(5, ge=1, le=100, description="Attempts that a language model is shown (k)")

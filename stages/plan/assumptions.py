@@ -50,7 +50,7 @@ def parse_priors(priors: tuple[str, ...], model: WorldModel) -> list[Belief]:
     for number, prior in enumerate(priors, start=1):
         match = _PRIOR.match(prior)
         if match is None:
-            raise UsageError(f"assumption {prior!r} is no literal", hint="write it like in(bottle, fridge_2)")
+            raise UsageError(f"assumption {prior!r} is not a literal", hint="write it like in(bottle, fridge_2)")
         _, kind, container = match.groups()
         if kind not in USUAL:
             raise UsageError(f"assumption {prior!r}: no usual size of {kind!r}", hint=f"known: {', '.join(USUAL)}")

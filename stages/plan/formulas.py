@@ -94,7 +94,7 @@ class _Reader:
         pairs = typed_names(entries(variables, "the variables of the goal"), "the variables of the goal")
         for name, kind in pairs:
             if not name.startswith("?") or name in binding:
-                raise self.refuse(f"{name} is no variable, or bound twice")
+                raise self.refuse(f"{name} is not a variable, or bound twice")
             if kind and kind not in self.names.objects.values():
                 kinds = ", ".join(sorted(set(self.names.objects.values()))[:12])
                 raise self.refuse(f"the scene has no {kind!r}; it has {kinds}")
@@ -151,7 +151,7 @@ def _long_form(text: str, reader: _Reader) -> Expression:
     match = _SHORT.match(text)
     if match is None:
         raise UsageError(
-            f"goal {text!r} is no literal", hint="write it like on(bottle_7, table_3), or as a formula in brackets"
+            f"goal {text!r} is not a literal", hint="write it like on(bottle_7, table_3), or as a formula in brackets"
         )
     terms: list[Expression] = []
     bound: dict[str, list[tuple[str, str]]] = {"every": [], "any": []}

@@ -26,10 +26,9 @@ class PlanParameters(SegmenterParameters):
 
     goal: tuple[str, ...] = Field(
         (),
-        description="Goal literals such as on(bottle_7,table_3) closed(fridge_2); predicates on, in, open, closed, "
-        "holding, and those of --domain; `not on(...)`, `on(every bottle,any table)`, or a formula in brackets with "
-        'and, or, not, forall, exists; with --language also on("red mug","dining table"). Empty: take an item out of '
-        "furniture with a door, put it on a table, shut the door",
+        description="Goal literals: on(bottle_7,table_3) closed(fridge_2), also not, every, any, formulas "
+        "and, with --language, words (docs/PLANNING.md). Empty: take an item out of furniture, "
+        "put it on a table, close the door",
     )
     task: Literal["", "fridge-to-microwave", "tidy-the-desk", "put-away-in-drawer", "stack-and-carry"] = Field(
         "", description="A task by name; its goal is derived from what is in the scene. Not together with --goal"
@@ -42,8 +41,8 @@ class PlanParameters(SegmenterParameters):
     robot: str = robot_option()
     stand: tuple[float, ...] = Field(
         (),
-        description="Where the robot starts: x y [m] and yaw [deg]; one that does not drive stays there. Empty: where "
-        "most room is, with --sequence of the places where its camera was",
+        description="Start pose of the base: x y [m] and yaw [deg]. Empty: the freest place, with --sequence "
+        "among the camera's",
     )
     planner: Literal["builtin", "fast-downward"] = Field(
         "builtin", description="Task planner; fast-downward is a program of its own (extra planning-gpl)"
@@ -54,39 +53,40 @@ class PlanParameters(SegmenterParameters):
     execute: bool = Field(True, description="Execute the plan in physics: in the true room when it is given")
     relocalize: bool = Field(
         True,
-        description="Before each action the robot sees pose and shape of the bodies that the action names, as they "
-        "are in the room of execution (stands for a look with a wrist camera); off: the planned motion is replayed",
+        description="Before each action the robot sees pose and shape of the action's bodies in the room of "
+        "execution; off: open loop",
     )
     eyes: Literal["true", "camera"] = Field(
         "true",
-        description="What a look tells: the truth; camera: poses and joint values fitted to rendered depth pictures, "
-        "through a segmenter, a localisation and encoders that err. The robot's own errors are there when a planned "
-        "motion is replayed, too",
+        description="What the robot sees: true poses; camera: poses and joint values estimated from rendered "
+        "depth, with errors of segmenter, localisation and encoders",
     )
     match_radius: float = Field(
-        0.5, gt=0, le=5, description="A body is the nearest of its class in the true room within this [m]"
+        0.5,
+        gt=0,
+        le=5,
+        description="Largest distance of a planned body from the nearest of its class in the true room [m]",
     )
-    clearance: float = Field(0.004, ge=0, le=0.05, description="Distance kept from obstacles [m]")
+    clearance: float = Field(0.004, ge=0, le=0.05, description="Clearance from obstacles [m]")
     size_uncertainty: float = Field(
         0.02,
         ge=0,
         le=0.2,
-        description="Items are planned to be up to this much thinner than reconstructed, as voxels "
-        "widen thin things [m]; what was looked at is taken as it is",
+        description="Largest reduction of an item's width for planning, as voxels widen thin things [m]; not "
+        "of what was looked at",
     )
     base_samples: int = Field(240, ge=16, le=20000, description="Base poses drawn per query")
     pair_samples: int = Field(2500, ge=16, le=1_000_000, description="Pairs of base and tool pose tried per query")
     path_samples: int = Field(800, ge=16, le=1_000_000, description="Samples of one RRT-Connect search")
     path_searches: int = Field(8, ge=1, le=1000, description="Path searches per query")
-    refinement_attempts: int = Field(3, ge=1, le=100, description="Times the geometry of one task plan is tried")
+    refinement_attempts: int = Field(3, ge=1, le=100, description="Tries of the motions of one task plan")
     task_attempts: int = Field(4, ge=1, le=100, description="Task plans tried, each without what failed before")
-    execution_attempts: int = Field(3, ge=1, le=20, description="Times an action is tried when it fails physically")
+    execution_attempts: int = Field(3, ge=1, le=20, description="Tries of an action that fails in execution")
     replans: int = Field(
         2,
         ge=0,
         le=20,
-        description="Times the robot looks around and plans anew when an action fails in all its "
-        "attempts, or when the goal does not hold at the end",
+        description="Replanning attempts after an action that failed in all its tries, or a goal that does not hold",
     )
     video_rate: float = Field(1.0, ge=0, le=30, description="Images per second in execution.mcap [1/s]; 0: none")
     image_width: int = Field(640, ge=64, le=4096, description="Width of the key frames [px]")
@@ -102,7 +102,7 @@ def check_options(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None
     if parameters.goal and parameters.task:
         raise UsageError("--goal and --task cannot be given together", hint="leave one of them out")
     if parameters.stand and len(parameters.stand) != 3:
-        raise UsageError(f"--stand has {len(parameters.stand)} values", hint=STAND)
+        raise UsageError(f"--stand has {len(parameters.stand)} values, not 3", hint=STAND)
     if parameters.eyes == "true" and (parameters.segmenter or parameters.segmenter_errors != "thesis"):
         raise UsageError("with --eyes true nothing is segmented", hint="give --eyes camera too")
     if inputs.get("domain") is not None and parameters.planner != "builtin":

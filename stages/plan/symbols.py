@@ -132,7 +132,7 @@ def parse_goal(literals: tuple[str, ...], objects: dict[str, str]) -> tuple[froz
     for literal in literals:
         match = _LITERAL.match(literal)
         if match is None:
-            raise UsageError(f"goal {literal!r} is no literal", hint="write it like on(bottle_7, table_3)")
+            raise UsageError(f"goal {literal!r} is not a literal", hint="write it like on(bottle_7, table_3)")
         predicate = match[1]
         arguments = [word.strip() for word in match[2].split(",")]
         if predicate not in allowed:

@@ -17,47 +17,49 @@ class PosesParameters(Parameters):
 
     method: Literal["rgbd", "refine", "sfm"] = Field(
         "rgbd",
-        description="`rgbd`: dense RGB-D odometry, loops and a pose graph; `refine`: the same with the motions of the "
-        "sequence's own poses (a phone's, which drift) in the place of odometry, where the depth does not deny them; "
-        "`sfm`: structure from motion on features (pycolmap), scaled by the depth",
+        description="`rgbd`: dense RGB-D odometry, loop closures, pose graph; `refine`: the same from the "
+        "sequence's own poses; `sfm`: structure from motion (pycolmap), scaled by depth",
     )
-    loop_closure: bool = Field(True, description="`rgbd`: recognise places and optimise the pose graph; off: odometry")
+    loop_closure: bool = Field(
+        True, description="`rgbd`: loop closures and pose graph optimisation; off: odometry alone"
+    )
     bundle_adjustment: bool = Field(
-        False, description="`rgbd`: adjust key frames and features together at the end (pycolmap)"
+        False, description="`rgbd`: bundle adjustment over key frames at the end (pycolmap)"
     )
-    use_color: bool = Field(True, description="`rgbd`: use colour where there is any; off: depth alone")
+    use_color: bool = Field(True, description="`rgbd`: photometric residuals where there is colour; off: depth alone")
     world: Literal["auto", "upright", "sequence", "first"] = Field(
         "auto",
-        description="World of the result: `sequence`: laid onto the poses that the sequence has; `upright`: z up, from "
-        "the floor or the cameras' mean up; `first`: the first camera; `auto`: `sequence` where it has poses, else "
-        "`upright`",
+        description="World frame: `sequence`: aligned to the sequence's poses; `upright`: z up, from floor or "
+        "mean camera up; `first`: the first camera; `auto`: `sequence` with poses, else `upright`",
     )
-    width: int = Field(320, ge=80, le=1280, description="Frames are halved until they are at most so wide [px]")
-    maximum_depth: float = Field(4.5, gt=0.2, description="Farther depth is not used [m]")
+    width: int = Field(320, ge=80, le=1280, description="Frames are downsampled by halves to at most this width [px]")
+    maximum_depth: float = Field(4.5, gt=0.2, description="Maximum depth [m]")
 
-    minimum_overlap: float = Field(
-        0.3, gt=0, le=1, description="An alignment is believed when this share of a frame lies on the other's surface"
-    )
+    minimum_overlap: float = Field(0.3, gt=0, le=1, description="Alignment: least overlap of the two frames")
     minimum_agreement: float = Field(
-        0.75, gt=0, le=1, description="... and this share of what should be seen is (the rest floats in front of it)"
+        0.75, gt=0, le=1, description="Alignment: least share of visible surface that agrees (the rest floats in front)"
     )
-    maximum_residual: float = Field(0.03, gt=0, description="... and the distance to its planes is at most this [m]")
+    maximum_residual: float = Field(0.03, gt=0, description="Alignment: largest point-to-plane error [m]")
     maximum_uncertainty: float = Field(
-        0.05, gt=0, description="... and its worst direction is known within this [m]; blank walls are not"
+        0.05, gt=0, description="Alignment: largest uncertainty along its worst direction [m]"
     )
     maximum_brightness_difference: float = Field(
-        0.1, gt=0, le=1, description="... and the brightness differs by at most this share of the range (rms)"
+        0.1, gt=0, le=1, description="Alignment: largest RMS photometric error, as a share of the range"
     )
-    key_overlap: float = Field(0.75, gt=0, le=1, description="A key frame is made when the overlap falls below this")
-    key_angle: float = Field(0.3, gt=0, le=1.5, description="... or the turn exceeds this [rad]")
-    key_distance: float = Field(0.15, gt=0, description="... or the way exceeds this share of the median depth")
+    key_overlap: float = Field(0.75, gt=0, le=1, description="Key frames: overlap below which a new one is made")
+    key_angle: float = Field(0.3, gt=0, le=1.5, description="Key frames: rotation above which a new one is made [rad]")
+    key_distance: float = Field(
+        0.15, gt=0, description="Key frames: translation above which a new one is made, as a share of the median depth"
+    )
 
-    loop_gap: int = Field(4, ge=2, description="Key frames nearer than this in order are no loop")
-    loop_candidates: int = Field(3, ge=0, le=50, description="Places that look alike and are tried, per key frame")
-    overlap_candidates: int = Field(
-        2, ge=0, le=50, description="Key frames that should see the same and are linked, per key frame and round"
+    loop_gap: int = Field(4, ge=2, description="Loop closures: least key frames between the two")
+    loop_candidates: int = Field(
+        3, ge=0, le=50, description="Loop closures: candidates by place recognition per key frame"
     )
-    overlap_rounds: int = Field(2, ge=0, le=10, description="How often linking and optimising is repeated")
+    overlap_candidates: int = Field(
+        2, ge=0, le=50, description="Links to overlapping key frames, per key frame and round"
+    )
+    overlap_rounds: int = Field(2, ge=0, le=10, description="Rounds of linking and optimisation")
 
     sfm_frames: int = Field(
         250, ge=3, le=5000, description="`sfm`: at most so many frames, spread evenly; those between are interpolated"

@@ -25,7 +25,7 @@ from scenewright.stages.poses.xfeat import XFeat
 
 MOST_CONTRADICTED, FEWEST_LOOPS = 0.15, 10
 """A path is not to be trusted that denies more than this share of its loops, of so many at least. Of four good paths
-none to a tenth was denied, of three that were off by a decimetre and more 16 to 52 % (docs/POSES.md)."""
+none to a tenth was denied, of three that were off by a decimetre and more 16 to 52 % (docs/MAPPING.md)."""
 
 CONTRADICTED = "contradicted"
 """Fault of a frame that the depth of the others contradicts where the path had put it."""

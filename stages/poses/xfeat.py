@@ -34,7 +34,7 @@ class XFeat:
         try:
             self._network = cv2.dnn.readNetFromONNX(str(weights))
         except (cv2.error, MemoryError) as error:
-            raise BadInput(f"{weights.name} is no ONNX network that OpenCV can read", hint=hint) from error
+            raise BadInput(f"{weights.name} is not an ONNX network that OpenCV can read", hint=hint) from error
         side = 2 * MULTIPLE
         try:
             maps = self._maps(np.zeros((side, side, 3), np.uint8))

@@ -150,5 +150,5 @@ def _goal(task: WrittenTask, domain: str, place: str) -> tuple[tuple[str, ...], 
             raise BadInput(f"{place}: goal {text!r} needs {arguments[literal[0]]} objects", hint=HINT)
         missing = [name for name in literal[1:] if name not in task.objects]
         if missing:
-            raise BadInput(f"{place}: goal {text!r}: {missing[0]} is no object of the task", hint=HINT)
+            raise BadInput(f"{place}: goal {text!r}: {missing[0]} is not an object of the task", hint=HINT)
     return task.goal_lits_gt

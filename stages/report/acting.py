@@ -25,6 +25,8 @@ class BodyRow:
     """On or in what."""
     mass: str
     joints: tuple[str, ...]
+    because: str = ""
+    """What of it is inferred, or why it is held."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,7 @@ def body_rows(scene: InteractiveScene) -> list[BodyRow]:
                 _place(body.relation, body.parent),
                 f"{body.mass:.2f} kg",
                 tuple(joints),
+                body.because,
             )
         )
     return sorted(rows, key=lambda r: (not r.joints, not r.movable, r.name))

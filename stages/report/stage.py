@@ -100,7 +100,7 @@ def _write(
         size = len(page.encode("utf-8"))
     except UnicodeEncodeError as error:
         raise BadInput(
-            f"the page would name {page[max(0, error.start - 40) : error.end]!r}, which is no UTF-8",
+            f"the page would name {page[max(0, error.start - 40) : error.end]!r}, which is not UTF-8",
             hint="make the artifact again, without files of others in it",
         ) from None
     if size > MAXIMUM_BYTES:

@@ -17,6 +17,8 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.drawing.palette import LAYOUT_COLORS, UNLABELLED, entity_color
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.formats.numpy_files import read_arrays
+from scenewright.stages.kit.formats.scene_links import INFERRED
+from scenewright.stages.kit.geometry.solids import hull_or_box
 from scenewright.stages.kit.measurement.cad_candidates import after_check
 from scenewright.stages.kit.rendering.surfaces import TriangleSoup, build_soup, srgb_to_linear
 from scenewright.stages.report.placed_models import ModelShelf
@@ -127,7 +129,8 @@ def _vertex_colors(mesh: trimesh.Trimesh) -> np.ndarray:
 def cad_model(
     cad_scene: CadScene, shelf: ModelShelf | None = None, candidates: Mapping[str, CadCandidate | None] | None = None
 ) -> Model | None:
-    """The CAD scene: models where they stand, reconstructed meshes where there is none, layout, surroundings.
+    """The CAD scene: models where they stand, reconstructed meshes where there is none (what is inferred of them in a
+    colour of its own), layout, surroundings.
 
     `candidates`: node -> what stands for it, instead of what the scene chose; their models come from `shelf`.
     """
@@ -151,6 +154,8 @@ def cad_model(
         if mesh is None:
             continue
         meshes.append((number, mesh))
+        if chosen is None and replacement.inferred is not None:
+            meshes += [(number, _inferred(np.array(corners))) for corners in replacement.inferred.pieces]
         classes[number] = class_name
         node_ids[number] = replacement.node
         if replacement.decision != "layout":
@@ -159,6 +164,13 @@ def cad_model(
     if nameless is not None:
         meshes.append((NAMELESS, nameless))
     return Model(build_soup(meshes), classes, names, node_ids) if meshes else None
+
+
+def _inferred(corners: np.ndarray) -> trimesh.Trimesh:
+    """Return a convex piece, corners (N, 3), in the colour of what nobody saw."""
+    solid = hull_or_box(corners)
+    color = np.round(255 * np.array(INFERRED)).astype(np.uint8)
+    return trimesh.Trimesh(solid.vertices, solid.faces, vertex_colors=color, process=False)
 
 
 def true_model(truth: GroundTruth, world_from_log: np.ndarray) -> Model | None:

@@ -44,9 +44,9 @@ class CommonParameters(Parameters):
     normal_window: int = Field(
         9, ge=3, le=31, description="Window of the normals [pixels, odd]; published: 13, on depth that is not smoothed"
     )
-    normal_step: int = Field(2, ge=1, le=6, description="Every how many-th row and column of that window is used")
+    normal_step: int = Field(2, ge=1, le=6, description="Stride in that window")
     normal_distance_factor: float = Field(
-        0.05, gt=0, description="Points farther than this times the depth take no part in a normal"
+        0.05, gt=0, description="Largest distance of a normal's points, times the depth"
     )
     convexity_window: int = Field(5, ge=3, le=31, description="Window of the minimum convexity [pixels, odd]")
     convexity_threshold: float = Field(0.97, gt=0, le=1, description="Less convex pixels are edges [cosine]")
@@ -56,15 +56,15 @@ class CommonParameters(Parameters):
     mutual_convexity: bool = Field(
         True, description="Judge convexity from both pixels of a pair (no: from the middle one alone, as published)"
     )
-    discontinuity_ratio: float = Field(0.01, gt=0, lt=1, description="Depth jumps over this share of depth are edges")
-    discontinuity_window: int = Field(3, ge=3, le=15, description="Window in which depth jumps are sought [pixels]")
+    discontinuity_ratio: float = Field(
+        0.01, gt=0, lt=1, description="Depth discontinuities: least step, as a share of depth"
+    )
+    discontinuity_window: int = Field(3, ge=3, le=15, description="Window of the depth discontinuities [pixels]")
     opening: int = Field(1, ge=0, le=5, description="Radius of the opening of the convex map [pixels]")
-    closing: int = Field(1, ge=0, le=5, description="Radius of the closing of the depth jumps [pixels]")
+    closing: int = Field(1, ge=0, le=5, description="Radius of the closing of the depth discontinuities [pixels]")
     geometric_minimum: int = Field(200, ge=1, description="Smallest geometric region [pixels at 640x480]")
 
-    fusion_minimum: int = Field(
-        800, ge=1, description="Geometric segments under this are discarded before fusion [pixels at 640x480]"
-    )
+    fusion_minimum: int = Field(800, ge=1, description="Smallest geometric segment that is fused [pixels at 640x480]")
     contained_share: float = Field(
         0.9, gt=0, lt=1, description="A mask of which more than this lies in one segment may be split out of it"
     )
@@ -75,25 +75,24 @@ class CommonParameters(Parameters):
     cluster_distance: float = Field(
         0.05, gt=0, description="Segments of an instance within this distance belong together [m]"
     )
-    cluster_step: int = Field(5, ge=1, description="Every how many-th point is looked at in that clustering")
+    cluster_step: int = Field(5, ge=1, description="Point stride of that clustering")
     small_object_pixels: int = Field(
         60, ge=1, description="Smallest segment that `ours` keeps for a mask [pixels at 640x480]"
     )
 
     score_threshold: float = Field(
-        0.3, gt=0, lt=1, description="Detections, instances and panoptic segments under this score are dropped"
+        0.3, gt=0, lt=1, description="Minimum score of detections, instances and panoptic segments"
     )
     suppression_overlap: float = Field(
-        0.5, gt=0, lt=1, description="Detections of one class that overlap more than this are one (IoU)"
+        0.5, gt=0, lt=1, description="Non-maximum suppression: IoU above which two detections of a class are one"
     )
 
     tiles: int | None = Field(
         None,
         ge=0,
         le=4,
-        description="Run the network that finds things on this many overlapping tiles a side too (2: four of .6 of the "
-        "frame's sides): small things, at more time; 0: none (default: those of `detector`, five times slower; none of "
-        "`tflite`, `onnx`)",
+        description="Overlapping tiles a side on which the network runs too: small things, at more time; 0: "
+        "none. Default: those of `detector`; none of `tflite`, `onnx`",
     )
 
     @field_validator("backend")

@@ -56,7 +56,7 @@ def read_gaussians(path: Path) -> Gaussians:
         raise BadInput(f"{path}: torn: {len(data) - end} bytes, expected {count * len(COLUMNS) * 4}")
     table = np.frombuffer(data[end:], "<f4").reshape(count, len(COLUMNS)).copy()
     if not np.isfinite(table).all() or (count and (table[:, -4:] == 0).all(axis=1).any()):
-        raise BadInput(f"{path}: a Gaussian is made of what is no number", hint="make the splat again")
+        raise BadInput(f"{path}: a Gaussian has a value that is not a number", hint="make the splat again")
     higher = table[:, 9 : 9 + 3 * HIGHER].reshape(count, 3, HIGHER).transpose(0, 2, 1)
     harmonics = np.concatenate([table[:, None, 6:9], higher], axis=1)
     at = 9 + 3 * HIGHER

@@ -166,7 +166,7 @@ class Trainer:
         loss, by = loss_of(drawn.picture, view.color, view.depth, self.method.loss)
         if not np.isfinite(loss):
             raise BadInput(
-                f"frame {view.frame}: the loss is no number after {self.steps} steps", hint="look at its depth"
+                f"frame {view.frame}: the loss is not a number after {self.steps} steps", hint="look at its depth"
             )
         gradients = drawn.backward(by)
         rates = {name: rate.at(self.steps) for name, rate in self.method.rates.items()}

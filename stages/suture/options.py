@@ -20,7 +20,7 @@ class MaskOptions(Parameters):
 
     segmentation: Literal["auto", "network", "files", "truth", "spoiled"] = Field(
         "auto",
-        description="Masks: a learned `network` (--segmenter, or the shipped one), your `files` (--masks), a rendered "
-        "scene's `truth`, or that `spoiled` as a learned mask is; `auto`: --masks where given, else the network",
+        description="Masks: a `network` (--segmenter, or the shipped one), `files` (--masks), a scene's "
+        "`truth`, or that `spoiled` with errors; `auto`: --masks where given, else the network",
     )
     pictures: int = Field(6, ge=0, le=200, description="Frames that are drawn")

@@ -72,8 +72,8 @@ class SimulateParameters(Parameters):
     record: str = Field("", description="Arm whose first trial is recorded with its motions; empty: the first arm")
     sight: Literal["model", "geometry", "pictures"] = Field(
         "model",
-        description="The needle is seen by an error `model`; or by the arm's estimator on views that are rendered of "
-        "the trial: `geometry` with spoiled masks (15 s a trial), `pictures` with the network's (80 s)",
+        description="How the needle is seen: an error `model`, or the arm's estimator on rendered views: "
+        "`geometry` with spoiled masks (15 s a trial), `pictures` with the network's (80 s)",
     )
 
 
@@ -113,11 +113,13 @@ def check_simulate(parameters: SimulateParameters, inputs: Mapping[str, Any]) ->
     """Raise UsageError for unknown arms, and for arms that are named twice."""
     for arm in parameters.arms:
         if arm not in ARM_NAMES:
-            raise UsageError(f"--arms: there is no arm {arm!r}", hint=f"choose of {', '.join(ARM_NAMES)}")
+            raise UsageError(f"--arms: there is no arm {arm!r}", hint=f"choose one of {', '.join(ARM_NAMES)}")
     if parameters.record and parameters.record not in parameters.arms:
         raise UsageError(f"--record {parameters.record} is none of the arms", hint=f"--arms {parameters.record}")
     if parameters.sight != "model" and inputs.get("perception") is not None:
-        raise UsageError(f"--perception is no error model of --sight {parameters.sight}", hint="leave one of them out")
+        raise UsageError(
+            f"--perception is not an error model of --sight {parameters.sight}", hint="leave one of them out"
+        )
     if len(set(parameters.arms)) != len(parameters.arms):
         raise UsageError(f"--arms: an arm is named twice ({' '.join(parameters.arms)})", hint="name each once")
 

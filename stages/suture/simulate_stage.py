@@ -78,7 +78,7 @@ def _model(arm: str, given: Path | None) -> PerceptionModel:
     """Return how an arm sees: the user's error model, or the arm's own. Raises BadInput for a file that is none."""
     if given is not None:
         if given.is_dir():
-            raise BadInput(f"{given}: a folder is no perception model", hint="give a TOML file")
+            raise BadInput(f"{given}: a folder is not a perception model", hint="give a TOML file")
         return perception_model(given)
     return perception_model(FOLDER / f"perception_{POLICIES[arm].perception}.toml")
 

@@ -18,8 +18,8 @@ class DetectParameters(Parameters):
 
     sizes: Literal["auto", "known", "estimated"] = Field(
         "auto",
-        description="Dishes of known sizes (--dishes, or the standard ones) with their stacks and utensils, or of any "
-        "size, estimated from depth (no stacks, no utensils); auto: estimated unless --dishes or a scene says sizes",
+        description="Sizes of dishes: known (--dishes, or the standard ones), with stacks and utensils, or "
+        "estimated from depth, without these; auto: known where --dishes or a scene gives them",
     )
     depth_scale: float | None = Field(
         None, gt=0, le=1, description="Metres a unit of the depth file; 0.001 for 16-bit images, 1 for arrays of metres"

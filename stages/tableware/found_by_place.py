@@ -26,5 +26,5 @@ def module_named(package: ModuleType, name: str) -> ModuleType:
     """Return a module of a package. Raises UsageError for a name that no file has."""
     modules = _modules(package)
     if name not in modules:
-        raise UsageError(f"there is no {name!r}", hint=f"choose of {', '.join(sorted(modules))}")
+        raise UsageError(f"there is no {name!r}", hint=f"choose one of {', '.join(sorted(modules))}")
     return load_module(modules[name])

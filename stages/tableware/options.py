@@ -30,7 +30,6 @@ class ActionTimes(Parameters):
     delay: float = Field(0.0, ge=0.0, le=60.0, description="Seconds that a farther bin adds to each trip, each way")
     chances: ChancesName = Field(
         "thesis",
-        description="What goes wrong: nothing; pulls that miss and second piles that slip, as the thesis measured; "
-        "besides, utensils that slide off dishes lifted side by side, as in physics, or drops as often as its trials "
-        "failed",
+        description="Failures: none; missed pulls and slipping second piles, as the thesis measured; also "
+        "utensils that slide off dishes, as in physics, or drops as often as its trials failed",
     )

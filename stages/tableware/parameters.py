@@ -98,7 +98,7 @@ def check_evaluate(parameters: EvaluateParameters, inputs: Mapping[str, Any]) ->
     names = names_in(policies)
     for policy in parameters.policies:
         if policy not in names:
-            raise UsageError(f"--policies: there is no policy {policy!r}", hint=f"choose of {', '.join(names)}")
+            raise UsageError(f"--policies: there is no policy {policy!r}", hint=f"choose one of {', '.join(names)}")
 
 
 SCENE = Stage(

@@ -39,5 +39,5 @@ def read_labelled_mesh(path: Path) -> LabelledMesh:
         raise BadInput(f"{path}: {len(labels)} labels for {len(mesh.vertices)} vertices", hint=HINT)
     integers = labels.astype(np.int64)
     if (integers != labels).any() or (integers < 0).any():
-        raise BadInput(f"{path}: labels that are no integers from 0 on", hint=HINT)
+        raise BadInput(f"{path}: labels that are not integers from 0 on", hint=HINT)
     return LabelledMesh(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64), integers)

@@ -21,8 +21,8 @@ class SceneNNParameters(Parameters):
 
     matching: Literal["thesis", "words"] = Field(
         "thesis",
-        description="When a label is of a class: `thesis` when a class's word occurs anywhere in its text, as in the "
-        "thesis's code (a `table lamp` is a table); `words` when it is the last word of the text, or of nyu_class",
+        description="Class of a label: `words`: the last word of its text or nyu_class; `thesis`: a class's "
+        "word anywhere (a `table lamp` is a table)",
     )
     name: str = Field("", pattern=r"^[A-Za-z0-9_.\-]*$", description="Name of the scene; default: that of the XML file")
     maximum_unlisted: float = Field(
@@ -33,13 +33,13 @@ class SceneNNParameters(Parameters):
 class SupportsParameters(Parameters):
     """How the things of a support annotation are found."""
 
-    every: int = Field(1, ge=1, description="Use every how many-th frame")
-    maximum_depth: float = Field(4.0, gt=0, description="Farther depth is not used [m]")
+    every: int = Field(1, ge=1, description="Use every n-th frame")
+    maximum_depth: float = Field(4.0, gt=0, description="Maximum depth [m]")
     point_reach: float = Field(
-        0.1, gt=0, le=1, description="A node that is given by a point is the entity of the map at most this far [m]"
+        0.1, gt=0, le=1, description="Largest distance of a node's point from its entity in the map [m]"
     )
     outline_reach: float = Field(
-        0.05, gt=0, le=1, description="An outline tells of what is at most this far from its frame's depth [m]"
+        0.05, gt=0, le=1, description="Largest distance of a point from its frame's depth to be inside an outline [m]"
     )
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from scenewright.schemas.cad_library import CadModel
-from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene, Replacement, SeenMotion
+from scenewright.schemas.cad_scene import SURROUNDINGS, CadScene, Inferred, Replacement, SeenMotion
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Box
@@ -17,9 +16,9 @@ from scenewright.stages.kit.formats.cad_models import read_model
 from scenewright.stages.kit.formats.mesh_files import read_mesh
 from scenewright.stages.kit.formats.mobility import NAMELESS, STANDS, Mobility, mobility
 from scenewright.stages.kit.formats.scene_bundle import BundleBody
-from scenewright.stages.kit.formats.scene_supports import resting_height
+from scenewright.stages.kit.formats.scene_supports import furniture_pieces, support_height
 from scenewright.stages.kit.geometry.boxes import box_from_bounds
-from scenewright.stages.urdf.steadiness import stands_steadily
+from scenewright.stages.kit.geometry.steadiness import stands_steadily
 
 
 def scene_bodies(
@@ -31,7 +30,7 @@ def scene_bodies(
     `movable`: classes that an arm carries; `fixed`: classes that stay where they are (`mobility`).
     Raises BadInput for a missing model or mesh.
     """
-    replaced = {entry.node: entry for entry in cad_scene.info.replacements if entry.decision == "cad"}
+    replaced = {entry.node: entry for entry in cad_scene.info.replacements if entry.decision != "layout"}
     bodies = [
         _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id))
         for node in graph.nodes
@@ -55,8 +54,8 @@ def _body(
         if not folder.is_dir():
             raise BadInput(f"{folder}: model of node {node.id} is missing", hint="run `cad` again")
         model = as_it_moved(read_model(folder), {} if replacement is None else replacement.motions)
-        if mobile.furniture and node.mark is None and "built_in" in model.recipe:
-            mobile = Mobility(False)
+        is_built_in = mobile.furniture and node.mark is None and "built_in" in model.recipe
+        mobile = Mobility(False) if is_built_in else mobile
         return BundleBody(
             name=node.id,
             class_name=node.class_name,
@@ -72,11 +71,15 @@ def _body(
             joint_values=dict(node.joints),
             held=frozenset() if replacement is None else replacement.held,
             part_colors={} if replacement is None else dict(replacement.part_colors),
+            because="held: it is built in" if is_built_in else "",
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
-    if mobile.furniture and node.mark is None and mesh is not None and not _steady(graph, node, mesh):
-        mobile = Mobility(False)
+    added = None if replacement is None else replacement.inferred
+    inferred = () if added is None else tuple(np.array(corners) for corners in added.pieces)
+    held = ""
+    if mobile.furniture and node.mark is None and mesh is not None and not _steady(graph, node, mesh, inferred):
+        mobile, held = Mobility(False), "it would not stand" if added is None else added.because
     origin = np.eye(4) if node.node_type == "layout" else _bottom(bounds)
     if mesh is not None:
         mesh.apply_translation(-origin[:3, 3])
@@ -90,12 +93,23 @@ def _body(
         furniture=mobile.furniture,
         box=bounds,
         mesh=mesh,
+        inferred=tuple(corners - origin[:3, 3] for corners in inferred),
+        because=_because(added, held),
     )
 
 
-def _steady(graph: ContactGraphFile, node: GraphNode, mesh: trimesh.Trimesh) -> bool:
-    height = resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id)
-    return height is not None and stands_steadily(np.asarray(mesh.vertices, dtype=float), mesh.faces, height)
+def _because(added: Inferred | None, held: str) -> str:
+    if held:
+        return f"held: {held}"
+    return "" if added is None or not added.pieces else f"inferred: {added.what}; {added.because}"
+
+
+def _steady(graph: ContactGraphFile, node: GraphNode, mesh: trimesh.Trimesh, inferred: Sequence[np.ndarray]) -> bool:
+    height = support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id)
+    if height is None:
+        return False
+    seen = furniture_pieces(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces), height)
+    return stands_steadily([*seen, *inferred], height)
 
 
 def as_it_moved(model: CadModel, motions: Mapping[str, SeenMotion]) -> CadModel:
@@ -115,13 +129,17 @@ def held_under_fixed(bodies: list[BundleBody]) -> list[BundleBody]:
     world would be squeezed out between it and the floor."""
     by_name = {body.name: body for body in bodies}
     fixed = [body for body in bodies if not body.movable and body.relation in STANDS]
-    fixed_names: set[str] = set()
+    carried: dict[str, str] = {}
     while fixed:
-        carrier = by_name.get(fixed.pop().parent or "")
-        if carrier is not None and carrier.movable and carrier.name not in fixed_names:
-            fixed_names.add(carrier.name)
+        body = fixed.pop()
+        carrier = by_name.get(body.parent or "")
+        if carrier is not None and carrier.movable and carrier.name not in carried:
+            carried[carrier.name] = body.name
             fixed.append(carrier)
-    return [replace(body, movable=False, furniture=False) if body.name in fixed_names else body for body in bodies]
+    return [
+        body.as_held(f"it carries {carried[body.name]}, which stays") if body.name in carried else body
+        for body in bodies
+    ]
 
 
 def _surroundings(file: Path) -> BundleBody:

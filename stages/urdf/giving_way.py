@@ -30,8 +30,8 @@ DEPTH = 0.003
 mesh by one."""
 TOUCHING = 0.001
 """Depth [m] by which pieces that touch may lie in each other."""
-CLEARANCE = 0.002
-"""Room that is left around what was cut out [m]: the padding of both."""
+CLEARANCE = 0.003
+"""Room that is left around what was cut out [m]: the padding of both, and a millimetre in which neither rubs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class Piece:
         return np.asarray(self.points.max(axis=0))
 
     def without(self, other: Piece) -> list[Piece]:
-        """Return what of it is outside of the least upright box around another, 2 mm wider, as pieces."""
+        """Return what of it is outside of the least upright box around another, 3 mm wider, as pieces."""
         box_from_world = inverse(other.world_from_box)
         around = apply(box_from_world, other.points)
         low, high = around.min(axis=0) - CLEARANCE, around.max(axis=0) + CLEARANCE

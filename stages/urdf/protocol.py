@@ -1,4 +1,4 @@
-"""The protocol: does a scene of whatever origin hold, by rules that others can repeat (docs/PROTOCOL.md)?
+"""The protocol: does a scene of whatever origin hold, by rules that others can repeat (docs/FORMATS.md)?
 
 One run of 5 s in each engine; the depth of bodies in each other and the sweep of joints are geometry, by Bullet's
 shapes.

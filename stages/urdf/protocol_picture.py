@@ -17,6 +17,8 @@ from scenewright.stages.kit.geometry.boxes import box_corners, convex_hull
 COLORS = {"stable": "#4d9a6a", "not stable": "#b0413e", "held": "#e08a2e", "fixed": "#b8b8b8"}
 VIEWS = (("from above", (0, 1), 2), ("from the side", (0, 2), 1))
 """Title, axes that are drawn, axis along which is looked."""
+HATCH = "////"
+"""Of what was seen in part."""
 MARGIN = 0.3
 """Room around the bodies [m]."""
 
@@ -41,9 +43,16 @@ def draw_protocol(path: Path, folder: Path, document: dict[str, Any]) -> None:
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
             axes.set(xlabel=f"{'xyz'[shown[0]]} [m]", ylabel=f"{'xyz'[shown[1]]} [m]")
         handles = [Patch(color=color, label=fate) for fate, color in COLORS.items()]
+        if any(is_inferred(body) for body in things):
+            handles.append(Patch(facecolor="white", edgecolor="#333333", hatch=HATCH, label="partly inferred"))
         handles.append(all_axes[0].plot([], [], "x--", color="black", label="colliding pair")[0])
         figure.legend(handles=handles, loc="lower center", ncols=len(handles))
         save(figure, path)
+
+
+def is_inferred(body: SceneBody) -> bool:
+    """Whether a part of its shape was not seen."""
+    return body.because.startswith("inferred")
 
 
 def _extreme(body: SceneBody, along: int) -> float:
@@ -54,7 +63,8 @@ def _extreme(body: SceneBody, along: int) -> float:
 
 def _draw(axes: Axes, body: SceneBody, shown: tuple[int, int], color: str, *, named: bool) -> None:
     outline = convex_hull(box_corners(body.box)[:, shown])
-    axes.add_patch(Polygon(outline, facecolor=color, edgecolor="#333333", alpha=0.75, linewidth=0.6))
+    hatch = HATCH if is_inferred(body) else None
+    axes.add_patch(Polygon(outline, facecolor=color, edgecolor="#333333", alpha=0.75, linewidth=0.6, hatch=hatch))
     if named:
         x, y = outline.mean(axis=0)
         axes.text(x, y, body.name, fontsize=5.5, ha="center", va="center", clip_on=True)

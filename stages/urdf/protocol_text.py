@@ -1,4 +1,4 @@
-"""What the protocol found, as JSON and as a table: every number by the name that docs/PROTOCOL.md defines."""
+"""What the protocol found, as JSON and as a table: every number by the name that docs/FORMATS.md defines."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -84,8 +84,9 @@ def _find_wedged(context: Context) -> dict[str, str]:
     return carrier_of
 
 
-def _hold(root: Path, bodies: list[BundleBody], wedged: Collection[str]) -> list[BundleBody]:
-    """Return the bodies for another writing into `root`, some of them held; removes what only free ones have there."""
+def _hold(root: Path, bodies: list[BundleBody], wedged: Mapping[str, str]) -> list[BundleBody]:
+    """Return the bodies for another writing into `root`, those held that lie in something (body -> what it lies in);
+    removes what only free ones have there."""
     for name in wedged:
         (root / "bodies" / f"{name}.urdf").unlink()
         for pattern in ("collision_*.obj", "cut_*.obj"):
@@ -93,7 +94,8 @@ def _hold(root: Path, bodies: list[BundleBody], wedged: Collection[str]) -> list
                 file.unlink()
     rewritten = _for_rewriting(bodies)
     return [
-        replace(body, movable=False, furniture=False, cut={}) if body.name in wedged else body for body in rewritten
+        replace(body.as_held(f"it lies in {wedged[body.name]}"), cut={}) if body.name in wedged else body
+        for body in rewritten
     ]
 
 

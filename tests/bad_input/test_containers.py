@@ -575,7 +575,7 @@ MCAP_LIES = {
         ["states 3 messages and holds 2"],
     ),
     "more behind its end": Lie(of("log.mcap", WHOLE + b"more"), "more bytes after the footer", TWO_GOOD[:1]),
-    "no header": Lie(of("log.mcap", MAGIC + WHOLE[len(MAGIC) + 17 :]), "is no header", []),
+    "no header": Lie(of("log.mcap", MAGIC + WHOLE[len(MAGIC) + 17 :]), "is not a header", []),
 }
 
 
@@ -707,15 +707,15 @@ def database(*statements: str) -> Callable[[Path], Path]:
 BAG = "rosbag2_bagfile_information"
 BAG2_METADATA = {
     "cut": (f"{BAG}:\n  relative_file_paths:\n  - [", "cannot be read"),
-    "no list": (f"{BAG}:\n  relative_file_paths: 7\n", "no list of names"),
-    "maps": (f"{BAG}:\n  relative_file_paths: [{{1: 2}}, '']\n", "no list of names"),
+    "no list": (f"{BAG}:\n  relative_file_paths: 7\n", "not a list of names"),
+    "maps": (f"{BAG}:\n  relative_file_paths: [{{1: 2}}, '']\n", "not a list of names"),
     "no map": (f"{BAG}: []\n", "does not describe a bag"),
     "other content": (f"# {BAG}\n- 1\n", "does not describe a bag"),
     "deep": (f"{BAG}: " + "[" * 100_000, "nested more than"),
     "deep lists": (f"{BAG}: " + "\n" + "- " * 10_000, "nested more than"),
     "merges": (f"{BAG}: {{a: &a {{x: 1}}, b: {{<<: [*a, *a]}}}}", "aliases"),
     "objects": (f"{BAG}: !!python/object/apply:os.system ['true']", "does not describe a bag"),
-    "lists as keys": (f"{BAG}: {{[1]: 2}}", "key that is no text"),
+    "lists as keys": (f"{BAG}: {{[1]: 2}}", "key that is not text"),
     "zero byte": (f'{BAG}:\n  relative_file_paths: ["a\\0b.db3"]\n', "cannot be read"),
     "long": (f"{BAG}:\n" + "# long\n" * 400_000, "larger than"),
     "packed otherwise": (

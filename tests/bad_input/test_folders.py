@@ -115,7 +115,7 @@ REPLICA = {"w": 96, "h": 72, "fx": 80, "fy": 80, "cx": 1, "cy": 1}
 
 ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
     "tum": [
-        ("rgb.txt", "abc rgb/1.png\n", "no time stamp"),
+        ("rgb.txt", "abc rgb/1.png\n", "not a time stamp"),
         ("rgb.txt", "nan rgb/1.png\n", "between 0 and"),
         ("rgb.txt", "1e999999999 rgb/1.png\n", "between 0 and"),
         ("rgb.txt", "-1 rgb/1.png\n", "between 0 and"),
@@ -138,7 +138,7 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
         ("timestamp.txt", "1 -5\n", "whole microseconds"),
         ("asus.ini", "fx eighty\n", "a name and a number"),
         ("asus.ini", "fx\n", "a name and a number"),
-        ("asus.ini", "depth_width 96\ndepth_height 72\nfy 80\n", "no numbers"),
+        ("asus.ini", "depth_width 96\ndepth_height 72\nfy 80\n", "not numbers"),
         ("asus.ini", "depth_width 1e300\ndepth_height 72\nfx 80\nfy 80\n", "pixels"),
         ("asus.ini", "depth_width 96\ndepth_height 96\nfx 80\nfy 80\n", "96x96"),
     ],
@@ -153,7 +153,7 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
         for camera, words in (
             ([1, 2], "no camera with|has no camera"),
             (REPLICA | {"w": 1e400}, "no camera|impossible"),
-            (REPLICA | {"fx": "80 px"}, "no numbers"),
+            (REPLICA | {"fx": "80 px"}, "not numbers"),
             (REPLICA | {"scale": 0}, "impossible"),
             (REPLICA | {"h": 96}, "96x96"),
         )
@@ -181,26 +181,26 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
             for fields, words in (
                 ({"frames": "all"}, "no list of frames"),
                 ({"frames": []}, "has no frames"),
-                ({"frames": [3]}, "frame 0: is no object"),
-                ({"frames": [{}]}, "no file name"),
-                ({"frames": [{"file_path": 7}]}, "no file name"),
-                ({"fl_x": "80"}, "is no number"),
-                ({"fl_x": 1e300}, "is no number"),
-                ({"fl_x": float("nan")}, "is no number"),
+                ({"frames": [3]}, "frame 0: is not an object"),
+                ({"frames": [{}]}, "not a file name"),
+                ({"frames": [{"file_path": 7}]}, "not a file name"),
+                ({"fl_x": "80"}, "is not a number"),
+                ({"fl_x": 1e300}, "is not a number"),
+                ({"fl_x": float("nan")}, "is not a number"),
                 ({"fl_x": -80}, "those of no camera"),
                 ({"fl_x": None}, "neither fl_x nor a camera_angle_x"),
                 ({"fl_x": None, "camera_angle_x": 4.0}, "neither fl_x nor a camera_angle_x"),
                 ({"w": 1e8}, "pixels"),
                 ({"w": 72}, "72x72, the images are 96x72"),
-                ({"k1": True}, "is no number"),
+                ({"k1": True}, "is not a number"),
                 ({"camera_model": "EQUIRECTANGULAR"}, "'EQUIRECTANGULAR' are not read"),
                 ({"camera_model": ["OPENCV"]}, "are not read"),
                 ({"depth_unit_scale_factor": 0}, "not positive"),
                 ({"depth_unit_scale_factor": 10**400}, "64 bits"),
                 ({"applied_scale": 0}, "not positive"),
-                ({"applied_transform": [[1, 0], [0, 1]]}, "no rigid transform"),
-                ({"applied_transform": [[-1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}, "no rigid transform"),
-                ({"applied_transform": [[float("nan")] * 4] * 3}, "no rigid transform"),
+                ({"applied_transform": [[1, 0], [0, 1]]}, "not a rigid transform"),
+                ({"applied_transform": [[-1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}, "not a rigid transform"),
+                ({"applied_transform": [[float("nan")] * 4] * 3}, "not a rigid transform"),
             )
         ],
         ("transforms.json", '{"frames": ' + "9" * 5000 + "}", "transforms.json"),
@@ -231,7 +231,7 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
         ("poses.txt", UNIT + "1 2\n", "2 columns, expected 12"),
         ("times.txt", "0\n", "1 times for 2 images"),
         ("times.txt", "0\nnan\n", "not between"),
-        ("times.txt", "0\nsoon\n", "is no time stamp"),
+        ("times.txt", "0\nsoon\n", "is not a time stamp"),
     ],
     "images, no calibration": [
         ("intrinsics.txt", "80 80", "2 numbers"),
@@ -247,11 +247,11 @@ ONE_FILE: dict[str, list[tuple[str, Change, str]]] = {
         ("calibration.yaml", "%YAML:1.0", "has no camera"),
         ("calibration.yaml", "a: [", "no YAML"),
         ("calibration.yaml", "!!python/object/apply:os.system ['true']", "no YAML|has no camera"),
-        ("calibration.yaml", "M1: [1]\nM2: [1]\n", "no 3x3 matrix"),
-        ("calibration.yaml", PAIR + "R: [2,0,0,0,1,0,0,0,1]\nT: [1,0,0]\n", "R and T do not say"),
+        ("calibration.yaml", "M1: [1]\nM2: [1]\n", "not a 3x3 matrix"),
+        ("calibration.yaml", PAIR + "R: [2,0,0,0,1,0,0,0,1]\nT: [1,0,0]\n", "R and T are not extrinsics"),
         ("calibration.yaml", "cam0: {intrinsics: [80, 80, 9, 9]}\ncam1: {intrinsics: [80, 80, 9, 9]}\n", "T_cn_cnm1"),
         ("calibration.yaml", MANY_ALIASES, "calibration.yaml"),
-        ("calib.txt", "P0: 80 0 47.5 0 0 80 35.5 0 0 0 x 0\n", "no number"),
+        ("calib.txt", "P0: 80 0 47.5 0 0 80 35.5 0 0 0 x 0\n", "not a number"),
         ("calib.txt", "P1: 80 0 47.5 0 0 80 35.5 0 0 0 1 0\n", "has no P0"),
         ("calib.txt", "cam0=[80 0 47; 0 80 35; 0 0 1]\ncam1=[80 0 47; 0 80 35]\nbaseline=100\n", "cam1"),
         ("calib.txt", "cam0=[80 0 9; 0 80 9; 0 0 1]\ncam1=[80 0 60; 0 80 9; 0 0 1]\nbaseline=9\ndoffs=2\n", "doffs 2"),
@@ -282,14 +282,14 @@ VIDEO = {"intrinsics.txt": "80 80 47.5 35.5"}
 SEVERAL_FILES: list[tuple[str, int, dict[str, Change], str]] = [
     ("nothing", 0, {}, "is not a log in a format"),
     ("images", 3, UNPAIRED, "3 and 2 images have no names or numbers in common"),
-    ("nothing", 0, {"video.mp4": b"", **VIDEO}, "no video that can be read|declares frames"),
-    ("nothing", 0, {"video.mp4": b"\0\0\0\x20ftypisom" + bytes(200), **VIDEO}, "no video that can be read|declares"),
+    ("nothing", 0, {"video.mp4": b"", **VIDEO}, "not a video that can be read|declares frames"),
+    ("nothing", 0, {"video.mp4": b"\0\0\0\x20ftypisom" + bytes(200), **VIDEO}, "not a video that can be read|declares"),
 ]
 
 REFUSED = [
     *[(layout, 2, {file: change}, words) for layout, rows in ONE_FILE.items() for file, change, words in rows],
     *[
-        (layout, 2, {file: renamed(name)}, "leads out of the folder|is no file name")
+        (layout, 2, {file: renamed(name)}, "leads out of the folder|is not a file name")
         for layout, file, renamed in NAMES
         for name in ELSEWHERE
     ],
@@ -483,7 +483,7 @@ def test_poses_of_tum_that_are_none_are_counted(tmp_path: Path) -> None:
     source = open_log(log, IngestParameters(maximum_transform_gap=0.05, maximum_time_difference=0.005))
     warning = next(note for note in source.notes if note.startswith("WARNING"))
     assert warning == (
-        "WARNING: 4 of 6 lines of groundtruth.txt are no poses "
+        "WARNING: 4 of 6 lines of groundtruth.txt are not poses "
         "(no time: 1, not finite: 1, quaternion not of length 1: 2)"
     )
     assert [entry.world_from_camera is None for entry in source.entries] == [False, True, True, True, True, False]

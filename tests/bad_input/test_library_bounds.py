@@ -93,7 +93,7 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
     "torn": ({"chair.urdf": "<robot"}, "well-formed"),
     "a mesh of the system": ({"chair.urdf": meshed("/etc/passwd")}, "is not in the folder"),
     "a mesh above": ({"chair.urdf": meshed("../secret.obj"), "../secret.obj": CUBE}, "is not in the folder"),
-    "a size that is no number": ({"chair.urdf": urdf(BOX.replace("1 1 1", "1 nan 1"))}, "is not finite"),
+    "a size that is not a number": ({"chair.urdf": urdf(BOX.replace("1 1 1", "1 nan 1"))}, "is not finite"),
     "two roots": ({"chair.urdf": '<robot><link name="a"/><link name="b"/></robot>'}, "2 root links"),
     "links in a circle": ({"chair.urdf": TWO_PARENTS}, "circle"),
     "a file that includes itself": (
@@ -205,11 +205,11 @@ REFUSED: dict[str, tuple[dict[str, str | bytes], str]] = {
     "a line without end": ({"chair.obj": CUBE + "x" * (obj_reading.LONGEST_LINE + 1)}, "chair.*a line of"),
     "a length that is infinite": (
         {"chair.gltf": json.dumps(BUFFERED).replace("3}", "1e999}")},
-        "chair.*no whole number",
+        "chair.*not a whole number",
     ),
     "a view that is infinite": (
         {"chair.glb": glb(bufferViews=[{"buffer": 0, "byteLength": 123456}]).replace(b"123456", b"1e999 ")},
-        "chair.*no whole number",
+        "chair.*not a whole number",
     ),
     "nodes that share children": (
         {"chair.glb": glb(nodes=[{"children": [k + 1, k + 1]} for k in range(16)] + [{"mesh": 0}])},
@@ -309,7 +309,7 @@ def test_names_that_are_no_text(tmp_path: Path) -> None:
     write(tmp_path / "in/table/meta.json", '{"model_cat": "Table \\ud800"}')
     library = add(tmp_path / "in", tmp_path / "out")
     records = ImportFile.read(library.path("imports.json")).models
-    assert len(library.info.models) == 2 and "no UTF-8" in records[0].findings[0]
+    assert len(library.info.models) == 2 and "not UTF-8" in records[0].findings[0]
     assert all(text.isprintable() for record in records for text in (record.name, record.source, *record.findings))
 
 

@@ -114,7 +114,7 @@ def command(recorded: tuple[Path, list[np.ndarray]], tmp_path: Path, write: Writ
     [
         (another_size, "frame 0: "),
         (beyond_the_class_file, "is beyond classes.json"),
-        (of_frames_that_are_not_there, "1 of 3 masks are of frames that are not there: 000777"),
+        (of_frames_that_are_not_there, "1 of 3 masks are of frames outside the sequence: 000777"),
         (lying_run_lengths, "adds up to"),
         (without_names, "has no name"),
         (boxes_alone, "its annotations are boxes, none has a mask"),

@@ -76,7 +76,7 @@ def test_a_torn_video(tmp_path: Path, take: Take) -> None:
     data = (log / "rgb.mp4").read_bytes()
     (log / "rgb.mp4").write_bytes(data[: len(data) // 2])
     said = refused(log)
-    assert "rgb.mp4: is no video that can be read: it was cut" in said and "its depth alone is read" in said
+    assert "rgb.mp4: is not a video that can be read: it was cut" in said and "its depth alone is read" in said
     (log / "rgb.mp4").unlink()  # the advice
     assert "is not that of pictures of 1920x1440 pixels (give --fx" in refused(log)
     for text, options in ((None, {"fx": 42.7, "fy": 42.8, "cx": 32.1, "cy": 23.2}), (OF_ARKIT, {})):
@@ -156,8 +156,8 @@ def test_pictures_of_a_wide_video_beside_square_depth(tmp_path: Path, take: Take
         ("odometry.csv", "a, b\n1, 2\n", "names no column x"),
         ("odometry.csv", "timestamp, frame, x, y, z, qx, qy, qz, qw\n", "has no poses"),
         ("odometry.csv", "x, x, y, z, qx, qy, qz, qw\n1, 1, 1, 1, 0, 0, 0, 1\n", "names a column twice"),
-        ("camera_matrix.csv", "320, 0, 240", "is no 3x3 camera matrix"),
-        ("camera_matrix.csv", "a, 0, 240\n0, 320, 180\n0, 0, 1", "holds what is no number"),
+        ("camera_matrix.csv", "320, 0, 240", "is not a 3x3 camera matrix"),
+        ("camera_matrix.csv", "a, 0, 240\n0, 320, 180\n0, 0, 1", "holds a value that is not a number"),
         ("camera_matrix.csv", "320, 0, 20\n0, 320, 180\n0, 0, 1", "is not that of pictures of 480x360"),
         ("camera_matrix.csv", "0, 0, 240\n0, 320, 180\n0, 0, 1", "are those of no camera"),
     ],
@@ -245,13 +245,13 @@ def test_any_damage_of_lzfse_is_counted() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"K": None}, "K holds what is no number"),
+        ({"K": None}, "K holds a value that is not a number"),
         ({"K": [1, 2, 3]}, "K has 3 numbers, expected 9"),
         ({"poses": [[0] * 6]}, "poses, frame 0 has 6 numbers, expected 7"),
-        ({"poses": [[0, 0, 0, 1, 0, 0, "a"]]}, "poses holds what is no number"),
+        ({"poses": [[0, 0, 0, 1, 0, 0, "a"]]}, "poses holds a value that is not a number"),
         ({"w": 0}, "are no size"),
         ({"perFrameIntrinsicCoeffs": [[1, 2]]}, "perFrameIntrinsicCoeffs, frame 0 has 2 numbers"),
-        ({"frameTimestamps": ["now"]}, "is no time stamp"),
+        ({"frameTimestamps": ["now"]}, "is not a time stamp"),
     ],
 )
 def test_metadata_that_is_none(tmp_path: Path, take: Take, changes: dict[str, object], words: str) -> None:

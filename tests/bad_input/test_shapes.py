@@ -33,7 +33,7 @@ def test_a_volume_of_another_shape(tmp_path: Path, case: str) -> None:
         voxel_size=0.02, truncation_distance=0.06, frames_integrated=1, segmentation="truth", entities=()
     ).write(tmp_path / "entities.json")
     np.savez(tmp_path / "volume.npz", **arrays)
-    assert load_free_space(PanopticMap(tmp_path)).distance.shape == (5, 512)
+    assert load_free_space(PanopticMap(tmp_path)).near.values.shape == (5, 512)
     arrays |= {
         "transposed": {"tsdf": arrays["tsdf"].T},
         "fewer blocks": {"weight": arrays["weight"][:4]},
@@ -42,6 +42,25 @@ def test_a_volume_of_another_shape(tmp_path: Path, case: str) -> None:
     }[case]
     np.savez(tmp_path / "volume.npz", **arrays)
     with pytest.raises(BadInput, match=r"volume\.npz: \w+: shape .*expected"):
+        load_free_space(PanopticMap(tmp_path))
+
+
+@pytest.mark.parametrize("case", ["other blocks", "signed", "no edge"])
+def test_free_cells_of_another_form(tmp_path: Path, case: str) -> None:
+    arrays = {
+        "block_coordinates": np.zeros((2, 3), np.int32),
+        "free": np.zeros((2, 64), np.uint8),
+        "edge": np.array([0.08]),
+    }
+    np.savez(tmp_path / "free_space.npz", **arrays)
+    assert load_free_space(PanopticMap(tmp_path)).far.edge == 0.08
+    arrays |= {
+        "other blocks": {"free": np.zeros((2, 512), np.uint8)},
+        "signed": {"free": np.zeros((2, 64), np.int64)},
+        "no edge": {"edge": np.array([0.0])},
+    }[case]
+    np.savez(tmp_path / "free_space.npz", **arrays)
+    with pytest.raises(BadInput, match="expected"):
         load_free_space(PanopticMap(tmp_path))
 
 
@@ -110,7 +129,7 @@ def test_trees_of_a_graph_without_the_scene() -> None:
 
 
 def test_a_page_that_names_what_is_no_utf8(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="no UTF-8"):
+    with pytest.raises(BadInput, match="not UTF-8"):
         _write("<p>caf\udce9</p>", "title", (), {}, SimpleNamespace(output=tmp_path))  # type: ignore[arg-type]
     assert list(tmp_path.iterdir()) == []
 

@@ -23,6 +23,7 @@ from benchmarks.keeping import wanted_trials
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 FOLDERS = ("benchmarks", "cli", "data", "docs", "schemas", "stages", "tests")
 MADE = ("data/disparity/raft_stereo", "data/networks/")
 """Weights that a user fetches or trains: they may be missing."""
@@ -67,7 +68,7 @@ def options() -> dict[str, set[str]]:
     return found | below_steps | dict.fromkeys(EXAMPLES, {"--panoptic-map", "--out"})
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", [*PAGES, *NOTEBOOKS], ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page: Path) -> None:
     found = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text())
     broken = [link for link in found if "://" not in link and not (page.parent / link).exists()]
@@ -182,12 +183,19 @@ def test_what_the_program_refuses_is_noticed(words: str) -> None:
 TYPED_IN_ORDER = [
     "index.md",
     "EDIT.md",
-    "POSES.md",
+    "LIBRARY.md",
+    "LLM3.md",
+    "LOGS.md",
+    "MAPPING.md",
+    "ROBOT.md",
+    "SCENES.md",
+    "STITCH.md",
+    "TIDY.md",
     *(f"tutorials/{page.name}" for page in ROOT.glob("docs/tutorials/*.md")),
 ]
 """Pages whose commands a reader types from the first to the last."""
 RUNS = {"outputs/demo": "demo", "outputs/room": "reconstruct"}
-"""What readers have made before: `make demo`, and the run of docs/tutorials/own_log.md."""
+"""What readers have made before: `make demo`, and the run of docs/LOGS.md."""
 
 
 @pytest.mark.parametrize("page", sorted(TYPED_IN_ORDER))

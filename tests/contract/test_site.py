@@ -12,7 +12,7 @@ import pytest
 from scenewright.schemas.kinds import KINDS
 from scenewright.stages.engine.discovery import all_stages
 
-from docs.reference import pages
+from docs.reference import pages, version
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -41,6 +41,8 @@ def test_the_site_builds_with_strict_links(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     html = (tmp_path / "site" / "index.html").read_text()
-    assert "tutorials/own_log.html" in html
+    assert "LOGS.html" in html
+    assert f"scenewright {version()}" in html
+    assert (tmp_path / "site" / "search" / "search_index.json").exists()
     fetched = re.findall(r'(?:<script[^>]+src|<link[^>]+rel="stylesheet"[^>]+href)="(https?://[^"]+)"', html)
     assert fetched == [], "the site works without a network"

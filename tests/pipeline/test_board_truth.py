@@ -1,4 +1,4 @@
-"""`python -m benchmarks.board.real --truth FOLDER`, end to end: a generated room in the form of docs/TRUTH.md."""
+"""`python -m benchmarks.board.real --truth FOLDER`, end to end: a generated room in the form of docs/DATA.md."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ inputs = { log = "$log" }
     [
         (BASE.replace("ingest", "nonsense"), "no step"),
         (BASE.replace("$log", "$nonsense"), "not declared"),
-        (BASE.replace("$log", "segments"), "no earlier step"),
+        (BASE.replace("$log", "segments"), "not an earlier step"),
         (BASE.replace("log = ", "nonsense = "), "no input"),
         (BASE.replace("inputs = ", "parameters = { nonsense = 1 }\ninputs = "), "no parameter"),
         (BASE.replace('inputs = { log = "$log" }', ""), "missing"),

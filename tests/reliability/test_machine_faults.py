@@ -364,7 +364,11 @@ EDITS: dict[str, tuple[Callable[[Path], object], str, str]] = {
         "a folder, not",
         "a folder, not",
     ),
-    "size that is no number": (lambda out: edit_manifest(out, schema_version=float("nan")), "schema_version", "schema"),
+    "size that is not a number": (
+        lambda out: edit_manifest(out, schema_version=float("nan")),
+        "schema_version",
+        "schema",
+    ),
     "path outside": (
         lambda out: edit_manifest(out, files=[{"path": "../x", "bytes": 1, "sha256": ""}]),
         "outside",
@@ -377,8 +381,8 @@ EDITS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     ),
     "path with a zero byte": (
         lambda out: edit_manifest(out, files=[{"path": "a\0b", "bytes": 1, "sha256": ""}]),
-        "is no path",
-        "is no path",
+        "is not a path",
+        "is not a path",
     ),
 }
 

@@ -417,7 +417,7 @@ def network_is_right_or_clear(weights: Path, tmp_path: Path, backend: str, *word
 
 
 def box_rows(form: str) -> np.ndarray:
-    """Return boxes of cup and chair in pixels of a 64 x 64 input, padded below (docs/SEGMENTATION.md, `resize`)."""
+    """Return boxes of cup and chair in pixels of a 64 x 64 input, padded below (docs/FORMATS.md, `resize`)."""
     colored, top = 64 * HEIGHT / WIDTH * 0.75, 0.0
     corners = np.array([[0.0, top, 32.0, top + colored], [32.0, top, 64.0, top + colored]], np.float32)
     if form == "corners":

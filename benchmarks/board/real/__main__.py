@@ -34,7 +34,7 @@ class Options(Recipe):
     data: Path = Field(Path("../shared/data"), description="Folder with the real logs and networks of others")
     logs: tuple[str, ...] = Field(tuple(LOGS), description="Which of the logs")
     halves: bool = Field(False, description="Compare the scenes of even and of odd frames too")
-    truth: Path | None = Field(None, description="Folder with a log and its truth (docs/TRUTH.md); no others then")
+    truth: Path | None = Field(None, description="Folder with a log and its truth (docs/DATA.md); no others then")
     checkout: Path = Field(REPOSITORY, description="The checkout whose commands are measured")
 
 

@@ -22,7 +22,7 @@ from scenewright.stages.urdf.settle_report import settle_report
 
 from benchmarks.board.method import Method
 from benchmarks.board.real.chain import Run, masks_of, run_chain
-from benchmarks.board.real.logs import ANNOTATED, ANNOTATIONS, LOGS, Log
+from benchmarks.board.real.logs import ANNOTATED, ANNOTATIONS, LOGS, OUTLINES, Log
 from benchmarks.board.real.records import AnnotatedRecord, Edges, Settling, Things
 from benchmarks.board.real.things import judged, overlaps_of, partners, surfaces_off
 from benchmarks.graph_scores import OPTIONS, judge
@@ -69,8 +69,11 @@ def own_sequence(log: Log, folder: Path) -> Sequence:
 
 
 def annotated_room(name: str, sequence: Sequence, folder: Path) -> TrueRoom:
-    """Return what is annotated of a log in the world of a sequence of it; writes below `folder`."""
-    truth = annotated_truth(name, sequence, folder)
+    """Return what is annotated of a log in the world of a sequence of it; writes below `folder`.
+
+    Outlines that were painted in its frames come before boxes, which hold the wall and the worktop beside a thing."""
+    outlines = OUTLINES / f"{name}.json"
+    truth = annotated_truth(name, sequence, folder, outlines if outlines.is_file() else None)
     return load_truth(truth, np.eye(4), OPTIONS.minimum_visible_points)
 
 

@@ -135,7 +135,7 @@ class HalvesRecord:
 
 @dataclass(frozen=True)
 class TruthRecord:
-    """A log against a truth in the form of docs/TRUTH.md."""
+    """A log against a truth in the form of docs/DATA.md."""
 
     log: str
     things: Things = Things()

@@ -1,4 +1,4 @@
-"""A log with a truth that somebody measured: the folder of docs/TRUTH.md, read as what comes from outside."""
+"""A log with a truth that somebody measured: the folder of docs/DATA.md, read as what comes from outside."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scenewright.stages.kit.labels import class_of_word, plain
 
 from benchmarks.board.real.logs import Log
 
-FORM = "docs/TRUTH.md shows the form"
+FORM = "docs/DATA.md shows the form"
 LARGEST_FILE = 4 * 2**20
 """Most bytes of truth.json."""
 MOST_POINTS = 20_000_000

@@ -10,6 +10,7 @@ from typing import Any
 
 from scenewright.cli.edit_command import asked_edit
 from scenewright.cli.edit_forms import forms_of
+from scenewright.cli.explaining.explaining import sentences
 from scenewright.cli.viewing.desk.asking import Asking
 from scenewright.cli.viewing.desk.subjects import subjects_of
 from scenewright.cli.viewing.view import viewer_of
@@ -108,6 +109,7 @@ class Desk:
             if made_of != self._page_of:
                 canvas = PageCanvas(f"{self._artifact.kind} {self.path.resolve().name}")
                 self._draw(canvas)
+                canvas.explain(sentences(self._artifact))
                 script = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
                 self._page = canvas.page(ServedPage(script, self._facts()))
                 self._page_of = made_of

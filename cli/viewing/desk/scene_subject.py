@@ -83,10 +83,14 @@ class SceneSubject(GraphSubject):
         if (name := kinds.get("place")) is not None:
             turn = values.pop("turn_degrees", 0.0)
             if not isinstance(turn, int | float) or not math.isfinite(turn):
-                raise UsageError(f"edit {what}: turn_degrees: that is no number", hint="leave it out, or give degrees")
+                raise UsageError(
+                    f"edit {what}: turn_degrees: that is not a number", hint="leave it out, or give degrees"
+                )
             to = values.get(name)
             if to is not None and not _is_place(to):
-                raise UsageError(f"edit {what}: {name}: that is no place", hint="click where it goes, or give numbers")
+                raise UsageError(
+                    f"edit {what}: {name}: that is not a place", hint="click where it goes, or give numbers"
+                )
             values |= asked_move(node, to, turn)
         return values
 

@@ -31,7 +31,7 @@ LARGEST = 16 * 2**20
 def object_of(food: str, seed: int) -> Body:
     """Return what is cut in a trial. Raises BadInput for no food."""
     if food not in FAMILIES:
-        raise BadInput(f"there is no food {food!r:.40}", hint=f"choose of {', '.join(FAMILIES)}")
+        raise BadInput(f"there is no food {food!r:.40}", hint=f"choose one of {', '.join(FAMILIES)}")
     return make_food(food, np.random.default_rng(seed)).moved(LYING)
 
 

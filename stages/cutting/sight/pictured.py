@@ -55,9 +55,9 @@ def _read_view(folder: Path) -> tuple[View, np.ndarray]:
     file = CameraFile.read(folder / "camera.json", largest=LARGEST_CAMERA, hint=HINT)
     camera, pose = file.camera, np.array(file.world_from_camera)
     if min(camera.width, camera.height) < 1 or camera.width * camera.height > MOST_PIXELS or camera.fx * camera.fy <= 0:
-        raise BadInput(f"{folder / 'camera.json'}: this is no camera", hint=HINT)
+        raise BadInput(f"{folder / 'camera.json'}: this is not a camera", hint=HINT)
     if not is_rigid(pose) or pose[2, 3] <= 0:
-        raise BadInput(f"{folder / 'camera.json'}: world_from_camera is no pose over a board at z = 0", hint=HINT)
+        raise BadInput(f"{folder / 'camera.json'}: world_from_camera is not a pose over a board at z = 0", hint=HINT)
     depth = _decode(folder / "depth.png", np.dtype(np.uint16), 2, camera)
     color = _decode(folder / "color.png", np.dtype(np.uint8), 3, camera)
     return View(depth.astype(np.float32) * np.float32(MILLIMETRE), camera, pose), np.ascontiguousarray(color[..., ::-1])

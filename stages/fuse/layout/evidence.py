@@ -20,7 +20,8 @@ THIN = 0.35
 OVER, DEEP = 2, 1.0
 """Surface that faces as a plane does, so many cells over its top and at most so far behind it [m], goes on where it
 ends."""
-FACING = float(np.cos(np.radians(15)))
+PARALLEL = float(np.cos(np.radians(15)))
+"""Cosine of normals over which two planes face the same way."""
 LARGE = 1.0
 """Area of a plane that speaks neither for a bound of the room nor against [m^2]."""
 VOTES = 1.5
@@ -83,7 +84,7 @@ def share_overtopped(plane: Plane, scene: Scene) -> float:
     top = np.full(len(columns), np.iinfo(np.int64).min)
     np.maximum.at(top, column_of, cells[:, 1])
     distance = plane.distance(scene.vertices)
-    behind = np.flatnonzero((distance < -BAND) & (distance > -DEEP) & (scene.normals @ plane.normal > FACING))
+    behind = np.flatnonzero((distance < -BAND) & (distance > -DEEP) & (scene.normals @ plane.normal > PARALLEL))
     over = plane.cells(scene.vertices[behind])
     place = np.minimum(np.searchsorted(columns, over[:, 0]), len(columns) - 1)
     is_over = (columns[place] == over[:, 0]) & (over[:, 1] >= top[place] + OVER)

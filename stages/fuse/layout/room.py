@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
-from scenewright.stages.fuse.layout.evidence import Scene, evidence
+from scenewright.stages.fuse.layout.evidence import PARALLEL, Scene, evidence
 from scenewright.stages.fuse.layout.planes import CELL, Plane, level_planes, upright_planes
 
 Kind = Literal["floor", "wall", "ceiling"]
@@ -26,7 +26,6 @@ FRONT = (BEFORE, 1.0)
 """A plane so far before a wall beside it is more likely the front of what is built into it [m]."""
 STOREY, OVER_FLOOR = 1.8, -6.0
 """A level less than this over a floor [m] is a top: log odds."""
-PARALLEL = float(np.cos(np.radians(15)))
 IN_FRONT = -1.5
 """Log odds of a plane before a wall."""
 

@@ -88,7 +88,7 @@ def pair_of_files(left: Path, right: Path) -> FolderCalibration:
         # EuRoC: T_BS is body_from_sensor.
         bodies = [_matrix(_first(document, "T_BS"), 4, 4) for document in documents]
         if any(body is None or not is_rigid(body) for body in bodies):
-            raise BadInput(f"{right}: neither a projection matrix nor T_BS says how the two cameras stand")
+            raise BadInput(f"{right}: has neither a projection matrix nor T_BS, so no extrinsics of the two cameras")
         assert bodies[0] is not None and bodies[1] is not None
         left_from_right = inverse(bodies[0]) @ bodies[1]
     notes = (f"intrinsics read from {left.name} and {right.name}",) if left.name != right.name else first.notes
@@ -128,7 +128,8 @@ def _camera_of(document: dict[Any, Any], path: Path) -> CalibrationRecord:
         numbers = _numbers(values)
         if numbers is None:
             raise BadInput(
-                f"{path}: has neither a camera matrix nor fx, fy, cx, cy", hint="docs/LOGS.md lists the files"
+                f"{path}: has neither a camera matrix nor fx, fy, cx, cy",
+                hint="docs/FORMATS.md, Layouts of logs, lists the files",
             )
         matrix = _pinhole_matrix(numbers)
     coefficients = _numbers(
@@ -159,7 +160,7 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
     for name, number in ((first, "1"), (second, "2")):
         matrix = _matrix(document[name], 3, 3)
         if matrix is None:
-            raise BadInput(f"{path}: {name} is no 3x3 matrix")
+            raise BadInput(f"{path}: {name} is not a 3x3 matrix")
         coefficients = _numbers(_first(document, f"D{number}", f"distCoeffs{number}")) or ()
         records.append(_record(matrix, size, path, coefficients, "plumb_bob"))
     notes: tuple[str, ...] = ()
@@ -167,7 +168,7 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
         beside = next((path.parent / name for name in EXTRINSICS if (path.parent / name).is_file()), None)
         if beside is None:
             raise BadInput(
-                f"{path}: has no R and T, which say how the two cameras stand to each other",
+                f"{path}: has no R and T, the extrinsics of the two cameras",
                 hint=f"put OpenCV's {EXTRINSICS[0]} of the same calibration beside it",
             )
         found = _read_yaml(beside)
@@ -176,7 +177,7 @@ def _opencv_pair(document: dict[Any, Any], first: str, second: str, path: Path) 
     rotation, offset = _matrix(document.get("R"), 3, 3), _numbers(document.get("T"))
     if rotation is None or offset is None or len(offset) != 3 or not is_rigid(transform_from(rotation, np.zeros(3))):
         raise BadInput(
-            f"{path}: R and T do not say how the two cameras stand to each other",
+            f"{path}: R and T are not extrinsics of two cameras",
             hint="R is a 3x3 rotation and T three numbers, x_right = R x_left + T",
         )
     left_from_right = inverse(transform_from(rotation, np.array(offset)))
@@ -250,7 +251,9 @@ def _from_text(text: str, path: Path, camera_number: int) -> FolderCalibration:
     try:
         numbers = [float(field) for field in re.sub(r"#.*", "", text).replace(",", " ").split()]
     except ValueError:
-        raise BadInput(f"{path}: is no calibration that is understood", hint="docs/LOGS.md lists the kinds") from None
+        raise BadInput(
+            f"{path}: is no calibration that is understood", hint="docs/FORMATS.md, Layouts of logs, lists the kinds"
+        ) from None
     if len(numbers) in (4, 8, 9) and not (len(numbers) == 9 and numbers[6:] == [0, 0, 1]):
         return FolderCalibration(_record(_pinhole_matrix(numbers[:4]), (0, 0), path, numbers[4:], "plumb_bob"))
     if len(numbers) in (9, 16):
@@ -282,7 +285,7 @@ def _kitti(text: str, path: Path, camera_number: int) -> FolderCalibration:
         try:
             projections[int(match[1])] = [float(field) for field in match[2].split()]
         except ValueError:
-            raise BadInput(f"{path}: P{match[1]} holds what is no number") from None
+            raise BadInput(f"{path}: P{match[1]} holds a value that is not a number") from None
     if camera_number not in projections:
         raise BadInput(f"{path}: has no P{camera_number}")
     records = {}

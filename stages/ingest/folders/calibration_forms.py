@@ -49,7 +49,7 @@ def stated_depth_units(document: Any, where: str) -> float | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e9:
-        raise BadInput(f"{where}: DepthMapFactor {value!r:.40} is no number of units per metre", hint="correct it")
+        raise BadInput(f"{where}: DepthMapFactor {value!r:.40} is not a number of units per metre", hint="correct it")
     return float(value)
 
 

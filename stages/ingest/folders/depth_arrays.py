@@ -52,7 +52,7 @@ def _pfm(data: bytes) -> np.ndarray:
     try:
         big_endian = float(match[3]) > 0
     except ValueError:
-        raise Unusable("undecodable_depth", "the scale of the Portable Float Map is no number") from None
+        raise Unusable("undecodable_depth", "the scale of the Portable Float Map is not a number") from None
     image = _pixels(data[match.end() :], (int(match[2]), int(match[1])), np.dtype(">f4" if big_endian else "<f4"))
     return np.flipud(image).astype(np.float32)  # rows go from the bottom up
 

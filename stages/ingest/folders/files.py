@@ -93,7 +93,7 @@ def named_file(root: Path, name: Any, where: str) -> Path:
     system, or over a link.
     """
     if not isinstance(name, str) or not name.strip() or "\0" in name or len(name) > 4096:
-        raise BadInput(f"{where}: {name!r:.60} is no file name")
+        raise BadInput(f"{where}: {name!r:.60} is not a file name")
     if "\\" in name and not (root / name).exists():
         name = name.replace("\\", "/")
     path = root / name
@@ -215,7 +215,7 @@ def pinhole(numbers: Iterable[Any], size: tuple[int, int] | None, where: str) ->
     try:
         values = [float(value) for value in numbers]
     except (TypeError, ValueError, OverflowError):
-        raise BadInput(f"{where}: intrinsics are no numbers", hint="give --fx --fy --cx --cy") from None
+        raise BadInput(f"{where}: intrinsics are not numbers", hint="give --fx --fy --cx --cy") from None
     if (
         len(values) != 4
         or not np.isfinite(values).all()

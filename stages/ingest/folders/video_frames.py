@@ -75,7 +75,7 @@ class VideoFrames:
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong is said once, in our words
         capture = cv2.VideoCapture(str(self.path))
         if not capture.isOpened():
-            raise BadInput(f"{self.path}: is no video that can be read", hint="export its frames as images")
+            raise BadInput(f"{self.path}: is not a video that can be read", hint="export its frames as images")
         if self._as_stored:
             capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
         return capture

@@ -42,12 +42,12 @@ def parse_object(data: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError):  # no UTF-8, a number of thousands of digits, nested too deep
         raise Undecodable("no JSON: not to be read") from None
     if not isinstance(parsed, dict):
-        raise Undecodable("the JSON is no object")
+        raise Undecodable("the JSON is not an object")
     return parsed
 
 
 def _refuse(constant: str) -> NoReturn:
-    raise Undecodable(f"no JSON: {constant} is no number")
+    raise Undecodable(f"no JSON: {constant} is not a number")
 
 
 def _lower_case_names(fields: dict[str, Any]) -> dict[str, Any]:
@@ -59,4 +59,4 @@ def _decode_base64(text: str) -> bytes:
     try:
         return base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):
-        raise Undecodable("field 'data' is no base64") from None
+        raise Undecodable("field 'data' is not base64") from None

@@ -23,7 +23,7 @@ class LogFile:
         """Open a file. Raises BadInput when it is missing or no plain file, with `kind` as what was expected."""
         try:
             if not path.is_file():
-                fault = "is a folder" if path.is_dir() else "is no file" if path.exists() else "file is missing"
+                fault = "is a folder" if path.is_dir() else "is not a file" if path.exists() else "file is missing"
                 raise BadInput(f"{path}: {fault}, expected {kind}")
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         except OSError as error:

@@ -61,7 +61,7 @@ class McapMessages:
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         if not isinstance(location, Location):
-            raise BadInput(f"{self.path}: {location!r} is no place in an MCAP file")
+            raise BadInput(f"{self.path}: {location!r} is not a place in an MCAP file")
         return self._as_stored(self._log.fetch(location))
 
     def close(self) -> None:

@@ -272,7 +272,7 @@ class McapLog:
     def _loose_body(self, offset: int) -> bytes:
         opcode, length = self._structure.head(offset)
         if opcode != Opcode.MESSAGE:
-            raise Damaged("is no message")
+            raise Damaged("is not a message")
         if length > LARGEST_CHUNK:
             raise Damaged(f"has {length} bytes, more than {LARGEST_CHUNK}")
         return self._file.exactly(offset + HEAD.size, length)

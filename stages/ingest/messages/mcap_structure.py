@@ -101,7 +101,7 @@ class McapStructure:
         """Messages that indexes of damaged chunks name."""
         magic = file.read(0, len(MAGIC))
         if magic != MAGIC:
-            fault = "is empty" if not magic else "is no MCAP file (wrong first bytes)"
+            fault = "is empty" if not magic else "is not an MCAP file (wrong first bytes)"
             raise BadInput(f"{damage.path}: {fault}", hint=HINT)
         footer = self._walk()
         self.indexes = np.array(self._index_rows, np.uint64).reshape(-1, 4)
@@ -185,7 +185,7 @@ class McapStructure:
             self.damage.found(f"record at byte {offset} with opcode {opcode} stands before the end of data")
         if offset == len(MAGIC):
             if opcode != Opcode.HEADER:
-                raise Damaged("is no header")
+                raise Damaged("is not a header")
             self.profile = read_header(self._definition(offset, length))
         elif opcode == Opcode.CHUNK:
             self._visit_chunk(offset, length)
@@ -370,7 +370,7 @@ class McapStructure:
         try:
             opcode, length = self.head(offset)
             if opcode != Opcode.CHUNK:
-                raise Damaged("is no chunk")
+                raise Damaged("is not a chunk")
             self._visit_chunk(offset, length)
             self.damage.found(f"a record before the chunk at byte {offset} lies about its length")
         except Damaged as fault:

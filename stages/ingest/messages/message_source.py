@@ -195,4 +195,4 @@ def _label_table(table: dict[str, str], where: str) -> tuple[LabelEntry, ...]:
     try:
         return tuple(LabelEntry(instance=int(key), class_name=table[key]) for key in sorted(table, key=int))
     except ValueError:
-        raise BadInput(f"{where}: metadata record {LABELS_METADATA!r} has a key that is no number") from None
+        raise BadInput(f"{where}: metadata record {LABELS_METADATA!r} has a key that is not a number") from None

@@ -37,7 +37,7 @@ def nested(fields: Fields, name: str) -> Fields:
     """Return a field that is a message of its own."""
     value = part(fields, name)
     if not isinstance(value, dict):
-        raise Undecodable(f"field {name!r} is no message")
+        raise Undecodable(f"field {name!r} is not a message")
     return value
 
 
@@ -46,7 +46,7 @@ def stamp_of(time: Any) -> int:
     if time is None:
         return 0
     if not isinstance(time, dict):
-        raise Undecodable("the stamp is no pair of seconds and nanoseconds")
+        raise Undecodable("the stamp is not a pair of seconds and nanoseconds")
     seconds = _first(time, ("sec", "secs", "seconds"))
     nanoseconds = _first(time, ("nsec", "nanosec", "nsecs", "nanos", "nanoseconds"))
     if not 0 <= seconds < LARGEST_SECONDS or not 0 <= nanoseconds < 1_000_000_000:
@@ -65,7 +65,7 @@ def name_of(fields: Fields, name: str) -> str:
     """Return a field that is a short text."""
     value = part(fields, name)
     if not isinstance(value, str):
-        raise Undecodable(f"field {name!r} is no text")
+        raise Undecodable(f"field {name!r} is not text")
     if len(value) > LONGEST_NAME:
         raise Undecodable(f"field {name!r} has more than {LONGEST_NAME} characters")
     return value
@@ -80,7 +80,7 @@ def size_of(fields: Fields, name: str) -> int:
     """Return a field that is a whole number from 0 to 2^32 - 1."""
     value = part(fields, name)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= LARGEST_SIZE:
-        raise Undecodable(f"field {name!r} is no size")
+        raise Undecodable(f"field {name!r} is not a size")
     return value
 
 
@@ -88,7 +88,7 @@ def bytes_of(fields: Fields, name: str) -> bytes:
     """Return a field that is bytes."""
     value = part(fields, name)
     if not isinstance(value, bytes | memoryview):
-        raise Undecodable(f"field {name!r} is no array of bytes")
+        raise Undecodable(f"field {name!r} is not an array of bytes")
     return bytes(value)
 
 
@@ -96,7 +96,7 @@ def numbers_of(fields: Fields, name: str, lengths: tuple[int, ...] | None = None
     """Return a field that is a list of finite numbers, of one of the `lengths`, or of any up to MOST_NUMBERS."""
     value = part(fields, name)
     if not isinstance(value, list | np.ndarray):
-        raise Undecodable(f"field {name!r} is no list of numbers")
+        raise Undecodable(f"field {name!r} is not a list of numbers")
     if len(value) > MOST_NUMBERS or (lengths is not None and len(value) not in lengths):
         raise Undecodable(f"field {name!r} has not as many numbers as it should")
     numbers = value.tolist() if isinstance(value, np.ndarray) else value
@@ -110,7 +110,7 @@ def number_of(fields: Fields, name: str) -> float:
 
 def _finite(number: Any, name: str) -> float:
     if isinstance(number, bool) or not isinstance(number, int | float):
-        raise Undecodable(f"field {name!r} is no number")
+        raise Undecodable(f"field {name!r} is not a number")
     try:
         value = float(number)
     except OverflowError:

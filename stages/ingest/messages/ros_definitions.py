@@ -298,7 +298,7 @@ class _IdlReader:
     def _resolve(self, name: str) -> tuple[str, int | None]:
         path = name.removeprefix("::").replace("::", "/")
         if not re.fullmatch(r"[A-Za-z_][\w/]*", path):
-            raise UnreadableDefinition(f"{name[:40]!r} in its definition is no type")
+            raise UnreadableDefinition(f"{name[:40]!r} in its definition is not a type")
         for depth in range(0 if name.startswith("::") else len(self._scope), -1, -1):
             candidate = "/".join([*self._scope[:depth], path])
             if candidate in self._type_of_name:
@@ -328,7 +328,7 @@ class _IdlReader:
             return int(word)
         if word.rpartition("::")[2] in self._constants:
             return self._constants[word.rpartition("::")[2]]
-        raise UnreadableDefinition(f"{word[:40]!r} in its definition is no size")
+        raise UnreadableDefinition(f"{word[:40]!r} in its definition is not a size")
 
     def _skip_annotation(self) -> None:
         self._take()

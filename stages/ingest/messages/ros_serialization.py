@@ -214,7 +214,7 @@ class _Cursor:
         try:
             return text.decode("utf-8")
         except UnicodeDecodeError:
-            raise Undecodable("a text is no UTF-8") from None
+            raise Undecodable("a text is not UTF-8") from None
 
     def _many(self, count: int) -> int:
         if count == SEQUENCE:

@@ -102,7 +102,7 @@ class Rosbag1Messages:
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         if not isinstance(location, Place) or not 0 <= location.chunk < len(self._chunks):
-            raise BadInput(f"{self.path}: {location!r} is no place in a ROS 1 bag")
+            raise BadInput(f"{self.path}: {location!r} is not a place in a ROS 1 bag")
         try:
             data = self._cache.get(location.chunk, self._unpack)
             record = record_within(data, location.offset)
@@ -123,7 +123,7 @@ class Rosbag1Messages:
                 raise BadInput(
                     f"{self.path}: is a bag of version {version}, only 2.0 is read", hint="convert it with `rosbag fix`"
                 )
-            raise self._bad("is empty" if self._size == 0 else "is no ROS 1 bag (wrong first bytes)")
+            raise self._bad("is empty" if self._size == 0 else "is not a ROS 1 bag (wrong first bytes)")
         closed = self._walk()
         if closed:
             self._find_stated_chunks()
@@ -190,7 +190,7 @@ class Rosbag1Messages:
 
     def _bag_header(self, record: Record) -> Record:
         if record.op != BAG_HEADER:
-            raise Damaged("is no bag header")
+            raise Damaged("is not a bag header")
         encryptor = record.fields.get(b"encryptor", b"")
         if encryptor:
             name = encryptor.decode("ascii", "replace")
@@ -258,7 +258,7 @@ class Rosbag1Messages:
             try:
                 record = read_record(self._file, offset)
                 if record.op != CHUNK:
-                    raise Damaged("is no chunk")
+                    raise Damaged("is not a chunk")
                 self._chunk(record, offset)
                 self._lines.found(f"a record before the chunk at byte {offset} lies about its length")
             except Damaged as fault:

@@ -102,7 +102,7 @@ class Rosbag2Messages:
     def fetch(self, location: Hashable) -> StoredMessage:
         """Return the message at a location that `messages` gave. Raises BadInput when it has become unreadable."""
         if not isinstance(location, Place) or location.part not in self._readable:
-            raise BadInput(f"{self.path}: {location!r} is no place in the bag")
+            raise BadInput(f"{self.path}: {location!r} is not a place in the bag")
         try:
             return self._as_stored(location.part, self._part(location.part).fetch(location.inside))
         except BadInput as error:

@@ -86,7 +86,7 @@ def _tree(text: str) -> Any:
         elif isinstance(node, str):
             key.append(node)
         else:
-            raise ValueError("it has a key that is no text")
+            raise ValueError("it has a key that is not text")
         if not isinstance(node, str):
             open_nodes.append((node, []))
         if len(open_nodes) > DEEPEST:
@@ -100,7 +100,7 @@ def _metadata_of(folder: Path, information: dict[str, Any]) -> BagMetadata:
         raise ValueError(f"messages are packed with {packing!r:.40}, only zstd is read")
     names = information.get("relative_file_paths")
     if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-        raise ValueError("relative_file_paths is no list of names")
+        raise ValueError("relative_file_paths is not a list of names")
     parts = tuple(dict.fromkeys(_inside(folder, name) for name in names))
     count = str(information.get("message_count"))
     return BagMetadata(parts, mode == "message", int(count) if count.isdecimal() else None)

@@ -102,7 +102,7 @@ class SqliteMessages:
         except (*_FAULTS, OverflowError) as error:
             raise BadInput(f"{self.path}: message {location!r} cannot be read: {_reason(error)}", hint=HINT) from None
         if not rows or rows[0][1] not in self._topics or not _is_message(*rows[0][2:]):
-            raise BadInput(f"{self.path}: {location!r} is no place in the bag")
+            raise BadInput(f"{self.path}: {location!r} is not a place in the bag")
         _, topic, time, data = rows[0]
         return StoredMessage(self._topics[topic], time, data, location)
 
@@ -118,7 +118,7 @@ class SqliteMessages:
         finally:
             file.close()
         if not head.startswith(MAGIC):
-            wrong_start = "is no SQLite file (wrong first bytes)" if head else "is empty"
+            wrong_start = "is not a SQLite file (wrong first bytes)" if head else "is empty"
             raise BadInput(f"{self.path}: {wrong_start}", hint=HINT)
         return head, file.size
 

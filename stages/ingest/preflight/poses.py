@@ -2,7 +2,7 @@
 
 Every hypothesis (a convention, a scale of the translations, a focal length, a lag) is scored on the same pairs of
 frames. A claim needs three things: a fit that is good in itself, a clear ratio to what it is compared with, and most
-of the pairs in favour. Thresholds were set on generated rooms and are measured in docs/INSPECT.md.
+of the pairs in favour. Thresholds were set on generated rooms and are measured in docs/LOGS.md.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the pre-flight says: one document with stable keys (docs/INSPECT.md), the same for people, JSON and HTML."""
+"""What the pre-flight says: one document with stable keys (docs/LOGS.md), the same for people, JSON and HTML."""
 
 from __future__ import annotations
 

@@ -184,5 +184,5 @@ def transform_matrix(translation: Any, rotation: Any) -> np.ndarray:
     with np.errstate(over="ignore"):
         norm = np.linalg.norm(quaternion)
     if not (np.isfinite(vector).all() and np.isfinite(norm)) or abs(norm - 1) > 0.02:
-        raise ValueError(f"translation {vector.tolist()}, quaternion {quaternion.tolist()} is no rigid transform")
+        raise ValueError(f"translation {vector.tolist()}, quaternion {quaternion.tolist()} is not a rigid transform")
     return transform_from_quaternion(quaternion / norm, vector)

@@ -46,4 +46,6 @@ def label_table(table: dict[str, str], path: Path) -> tuple[LabelEntry, ...]:
     try:
         return tuple(LabelEntry(instance=int(key), class_name=table[key]) for key in sorted(table, key=int))
     except ValueError:
-        raise BadInput(f"{path}: metadata record {LABELS_METADATA!r} has a key that is no instance number") from None
+        raise BadInput(
+            f"{path}: metadata record {LABELS_METADATA!r} has a key that is not an instance number"
+        ) from None

@@ -121,4 +121,4 @@ class IndexedMcap:
 
     def _bad(self, fault: Exception | str) -> BadInput:
         detail = str(fault) or type(fault).__name__
-        return BadInput(f"{self.path}: is no whole MCAP file of ours: {detail:.200}", hint=HINT)
+        return BadInput(f"{self.path}: is not a whole MCAP file of ours: {detail:.200}", hint=HINT)

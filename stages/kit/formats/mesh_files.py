@@ -236,7 +236,7 @@ def _check_obj(data: bytes) -> bool:
 def whole_number(value: object) -> int:
     """Return a count, a length or an offset of a glTF. Raises ValueError for what is none."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 2**53 or value != int(value):
-        raise ValueError(f"{value!r:.40} is no whole number")
+        raise ValueError(f"{value!r:.40} is not a whole number")
     return int(value)
 
 

@@ -1,17 +1,17 @@
 """What of a scene is free to move: what an arm carries, and furniture that stands by its own weight.
 
 Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
-thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane within 4 cm of its
-bottom, laden or not. What a person marked (`edit mark`) is as they said; what hangs stays.
+thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane, laden or not.
+What a person marked (`edit mark`) is as they said; what hangs stays.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
-from scenewright.stages.kit.formats.scene_supports import resting_height
+from scenewright.stages.kit.formats.scene_supports import support_height
 
 STANDS = ("supports", "contains")
 BUILT_IN = frozenset(
@@ -49,6 +49,8 @@ class Mobility:
 
     movable: bool
     furniture: bool = False
+    why: str = field(default="", compare=False)
+    """In words, as a clause."""
 
 
 def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str], fixed: Collection[str]) -> Mobility:
@@ -57,17 +59,22 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
     `carriable`: classes that an arm carries; `fixed`: classes that stay although they would be furniture.
     """
     link = graph.parent_link(node.id)
-    stands = link is None or link.relation in STANDS
-    if node.node_type == "layout" or not stands:
-        return Mobility(False)
+    if node.node_type == "layout":
+        return Mobility(False, why="it bounds the room")
+    if link is not None and link.relation not in STANDS:
+        return Mobility(False, why="it hangs, and would fall")
+    is_carriable = node.class_name in carriable
     if node.mark is not None:
-        return Mobility(node.mark == "movable", node.mark == "movable" and node.class_name not in carriable)
-    if node.class_name in carriable:
-        return Mobility(True)
+        is_free = node.mark == "movable"
+        return Mobility(is_free, is_free and not is_carriable, f"a person marked it {node.mark}")
+    if is_carriable:
+        return Mobility(True, why=f"an arm carries things of class {node.class_name}")
     if link is None or link.source == SCENE_NODE:
-        return Mobility(False)
-    if node.class_name in BUILT_IN or node.class_name in fixed:
-        return Mobility(False)
-    if resting_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
-        return Mobility(False)
-    return Mobility(True, furniture=True)
+        return Mobility(False, why="nothing was found that carries it")
+    if node.class_name in fixed:
+        return Mobility(False, why=f"class {node.class_name} is among the classes to keep fixed")
+    if node.class_name in BUILT_IN:
+        return Mobility(False, why=f"class {node.class_name} is part of the building, or too heavy to push")
+    if support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
+        return Mobility(False, why="the graph puts it on no level plane")
+    return Mobility(True, furniture=True, why="it is furniture and stands by its own weight")

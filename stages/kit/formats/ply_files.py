@@ -99,7 +99,7 @@ def read_ply(path: Path) -> ColoredMesh:
     rows = np.frombuffer(body[split:], dtype=_FACE)
     triangles = rows["indices"].astype(np.int32)
     if (rows["count"] != 3).any() or (faces and (triangles.min() < 0 or triangles.max() >= vertices)):
-        raise BadInput(f"{path}: a face is no triangle of its vertices")
+        raise BadInput(f"{path}: a face is not a triangle of its vertices")
     return ColoredMesh(
         np.stack([table[name] for name in "xyz"], axis=1).astype(np.float32),
         triangles,

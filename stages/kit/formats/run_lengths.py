@@ -24,7 +24,7 @@ def decode_rle(encoding: Any, shape: tuple[int, int]) -> np.ndarray:
     """
     size = encoding.get("size") if isinstance(encoding, dict) else None
     if not isinstance(size, list) or len(size) != 2 or "counts" not in encoding:
-        raise BadInput("its segmentation is no RLE ({size, counts})", hint="pycocotools.mask.encode writes one")
+        raise BadInput("its segmentation is not an RLE ({size, counts})", hint="pycocotools.mask.encode writes one")
     if size != [shape[0], shape[1]]:
         raise BadInput(
             f"its RLE is of {size[1]!r:.12} x {size[0]!r:.12} pixels, the frame of {shape[1]} x {shape[0]}",

@@ -26,8 +26,9 @@ from scenewright.stages.kit.formats.scene_links import (
     model_links,
     own_visual,
     still_mesh_links,
+    with_inferred,
 )
-from scenewright.stages.kit.formats.scene_supports import carried_by, resting_height
+from scenewright.stages.kit.formats.scene_supports import carried_by, resting_height, support_height
 from scenewright.stages.kit.formats.urdf_check import NAME, require_sound
 from scenewright.stages.kit.formats.urdf_file import Link, Shape, Urdf, UrdfJoint, write_urdf
 from scenewright.stages.kit.geometry.boxes import box_yaw
@@ -74,6 +75,14 @@ class BundleBody:
     """Movable, but nothing that an arm carries."""
     cut: Mapping[int, tuple[np.ndarray, ...]] = field(default_factory=dict)
     """Number of a collision shape of its mesh -> corners (N, 3), body frame, of the convex pieces in its place."""
+    inferred: tuple[np.ndarray, ...] = ()
+    """Corners (N, 3), body frame [m], of convex pieces that nobody saw, and that its mesh needs to stand."""
+    because: str = ""
+    """What of it is inferred and why, or why it is held."""
+
+    def as_held(self, why: str) -> BundleBody:
+        """Return the body fixed where it is."""
+        return replace(self, movable=False, furniture=False, because=f"held: {why}")
 
 
 def write_scene_bundle(root: Path, bodies: list[BundleBody], graph: ContactGraphFile) -> InteractiveSceneFile:
@@ -180,6 +189,7 @@ def _links(
         return links.with_friction(substance.friction)
     elif body.mesh is not None and visual is not None:
         links = _mesh_links(root, body, body.mesh, visual, substance.hull_density, graph)
+        links = with_inferred(root, links, body.inferred)
         links = cut_links(root, links, body.cut) if body.cut else links
     else:
         links = box_links(body.name, body.world_from_body, body.box, substance.hull_density)
@@ -193,12 +203,23 @@ def _mesh_links(
     nodes = {node.id: node for node in graph.nodes}
     pose = body.world_from_body
     if body.movable:
-        height = resting_height(graph, nodes, body.name)
+        carried = carried_by(graph, nodes, body.name)
+        is_in_pieces = body.furniture or bool(carried)
+        height = (support_height if is_in_pieces else resting_height)(graph, nodes, body.name)
         before = pose if body.reconstructed is None else body.reconstructed
         rests_at = None if height is None else height - float(before[2, 3])
-        carried = carried_by(graph, nodes, body.name)
-        if body.furniture or carried:
-            return furniture_links(root, body.name, mesh, visual, density, before, rests_at=rests_at, carried=carried)
+        if is_in_pieces:
+            return furniture_links(
+                root,
+                body.name,
+                mesh,
+                visual,
+                density,
+                before,
+                rests_at=rests_at,
+                carried=carried,
+                inferred=body.inferred,
+            )
         return mesh_links(root, body.name, mesh, visual, density, rests_at=rests_at)
     yaw = float(box_yaw(body.box) - np.arctan2(pose[1, 0], pose[0, 0]))
     return still_mesh_links(body.name, mesh, visual, density, pose, yaw, carried_by(graph, nodes, body.name))
@@ -282,5 +303,6 @@ def _record(body: BundleBody, links: BodyLinks) -> SceneBody:
         mass=links.mass,
         contains=model.contains if model is not None else False,
         grasp_width=width,
+        because=body.because,
         world_from_reconstructed=None if body.reconstructed is None else as_transform(body.reconstructed),
     )

@@ -39,6 +39,8 @@ LAYOUT_DENSITY = 1000.0
 """Density of floor, walls and ceiling [kg/m^3]; by eye."""
 GREY = (0.6, 0.6, 0.6, 1.0)
 """Colour of links without one (RGBA, 0 to 1)."""
+INFERRED = (0.55, 0.35, 0.85, 1.0)
+"""Colour of what nobody saw (RGBA, 0 to 1)."""
 URDF_MESHES = (".obj", ".stl")
 """What every loader of URDF reads; pybullet refuses a whole file that names a GLB."""
 
@@ -223,15 +225,17 @@ def furniture_links(
     *,
     rests_at: float | None,
     carried: Sequence[Carried] = (),
+    inferred: Sequence[np.ndarray] = (),
 ) -> BodyLinks:
     """Return the link of furniture without CAD model: `visual` to look at, convex pieces of its mesh (body frame) to
     collide with, weighing what the hull of it all weighs at `density` [kg/m^3].
 
-    It stands on one foot more (`furniture_pieces`; `rests_at` [m], body frame). Pieces are cut level below what it
-    carries (`world_from_body`: where it was reconstructed), and a pad lies under each of these.
+    None reaches below `rests_at` [m], body frame. Pieces are cut level below what it carries (`world_from_body`: where
+    it was reconstructed), and a pad lies under each of these. What nobody saw of it (`inferred`: corners (N, 3) of
+    convex pieces) weighs as the rest does, and is added by `with_inferred`.
     """
     points = np.asarray(mesh.vertices, dtype=float)
-    properties = _hull(points, density)[1]
+    properties = _hull(np.concatenate([points, *inferred]), density)[1]
     pieces = furniture_pieces(points, np.asarray(mesh.faces), rests_at)
     pieces = cut_below(pieces, world_from_body, carried)
     solids = [_hull(piece, density)[0] for piece in pieces]
@@ -239,7 +243,9 @@ def furniture_links(
     for number, solid in enumerate(solids):
         write_obj(root / "meshes" / name / f"collision_{number}.obj", solid.vertices, solid.faces)
         collisions.append(Shape(f"meshes/{name}/collision_{number}.obj"))
-    links = BodyLinks((Link(name, mass_properties(solids, [density] * len(solids)), (visual,), tuple(collisions)),))
+    solids += [hull_or_box(corners) for corners in inferred]
+    visuals = (visual, *_shown_pads(world_from_body, carried))
+    links = BodyLinks((Link(name, mass_properties(solids, [density] * len(solids)), visuals, tuple(collisions)),))
     return links.with_mass(properties.mass)
 
 
@@ -265,7 +271,21 @@ def still_mesh_links(
         frame[:3, 3] = turned[:3, :3] @ center
         collisions.append(Shape(box_size=_triple(size), link_from_shape=frame))
     collisions += _pads_of(world_from_body, carried)
-    return BodyLinks((Link(name, properties, (visual,), tuple(collisions)),))
+    return BodyLinks((Link(name, properties, (visual, *_shown_pads(world_from_body, carried)), tuple(collisions)),))
+
+
+def with_inferred(root: Path, links: BodyLinks, inferred: Sequence[np.ndarray]) -> BodyLinks:
+    """Return the one link of a thing with its mesh, and convex pieces, corners (N, 3) in its frame, to collide with and
+    to look at, in the colour of what nobody saw."""
+    if not inferred:
+        return links
+    link, visuals, collisions = links.links[0], list(links.links[0].visuals), list(links.links[0].collisions)
+    for number, corners in enumerate(inferred):
+        file, solid = f"meshes/{link.name}/inferred_{number}.obj", hull_or_box(corners)
+        write_obj(root / file, solid.vertices, solid.faces)
+        visuals.append(Shape(file, color=INFERRED))
+        collisions.append(Shape(file))
+    return replace(links, links=(replace(link, visuals=tuple(visuals), collisions=tuple(collisions)),))
 
 
 def cut_links(root: Path, links: BodyLinks, cut: Mapping[int, Sequence[np.ndarray]]) -> BodyLinks:
@@ -292,6 +312,11 @@ def _pads_of(world_from_body: np.ndarray, carried: Sequence[Carried]) -> list[Sh
         frame = body_from_world @ transform_from_yaw(world_yaw, center)
         shapes.append(Shape(box_size=_triple(size), link_from_shape=frame))
     return shapes
+
+
+def _shown_pads(world_from_body: np.ndarray, carried: Sequence[Carried]) -> list[Shape]:
+    """Return the pads whose planes nobody saw, to look at."""
+    return [replace(shape, color=INFERRED) for shape in _pads_of(world_from_body, [c for c in carried if c.hidden])]
 
 
 def _hull(points: np.ndarray, density: float) -> tuple[Solid, MassProperties]:

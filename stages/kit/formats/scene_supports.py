@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import Box
-from scenewright.stages.kit.geometry.boxes import box_yaw
+from scenewright.stages.kit.geometry.boxes import bottom, box_yaw
 from scenewright.stages.kit.geometry.convex_pieces import convex_pieces
 from shapely import contains_xy
 from shapely.geometry import MultiPoint, Polygon
@@ -21,9 +21,7 @@ from shapely.geometry import MultiPoint, Polygon
 LARGEST_STEP = 0.04
 """What a surface may stick out of the plane that stands for it, or a thing hover over it [m]: twice the usual voxel."""
 FEWEST_CORNERS = 4
-"""Fewer span no solid: what sticks out of a plane there is a spike. A foot has at least one less on the ground."""
-FOOT_REACH, FOOT_THICKNESS = 0.10, 0.01
-"""What of furniture counts as its feet above the floor, and how thick they are made [m]."""
+"""Fewer span no solid: what sticks out of a plane there is a spike."""
 PAD_THICKNESS = 0.02
 """Thickness of the pad under a carried body [m]; by eye."""
 MARGIN = 0.01
@@ -36,6 +34,8 @@ class Carried:
 
     box: Box
     height: float
+    hidden: bool = False
+    """Whether nobody saw the plane."""
 
     def polygon(self, margin: float = 0.0) -> Polygon:
         """Return the footprint, grown by `margin` [m] on all sides."""
@@ -46,10 +46,10 @@ class Carried:
         return Polygon(corners @ turn.T + np.array(self.box.center[:2]))
 
 
-def resting_height(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) -> float | None:
-    """Return the height [m] of the plane that a node stands or lies on.
+def support_height(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) -> float | None:
+    """Return the height [m] of the level plane that a node stands or lies on, however much lower that is.
 
-    None when the graph names no level plane, or one further than 4 cm from the bottom of the node's box.
+    None when the graph names no such plane, or one that is more than 4 cm above the bottom of the node's box.
     """
     link, node = graph.parent_link(name), nodes.get(name)
     if link is None or link.plane is None or node is None or node.box is None or link.source not in nodes:
@@ -60,10 +60,18 @@ def resting_height(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: s
     normal = np.array(plane.normal)
     if abs(normal[2]) < 0.9:
         return None
-    x, y, z = node.box.center
+    x, y, _ = node.box.center
     height = float(-(plane.offset + normal[0] * x + normal[1] * y) / normal[2])
-    bottom = z - 0.5 * node.box.size[2]
-    return height if abs(bottom - height) <= LARGEST_STEP else None
+    return height if height - bottom(node.box) <= LARGEST_STEP else None
+
+
+def resting_height(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) -> float | None:
+    """Return the height [m] of the plane that a node stands or lies on. None where `support_height` is, or more than
+    4 cm below the bottom of the node's box."""
+    height, node = support_height(graph, nodes, name), nodes.get(name)
+    if height is None or node is None or node.box is None:
+        return None
+    return height if bottom(node.box) - height <= LARGEST_STEP else None
 
 
 def carried_by(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) -> list[Carried]:
@@ -74,7 +82,8 @@ def carried_by(graph: ContactGraphFile, nodes: dict[str, GraphNode], name: str) 
             continue
         height, box = resting_height(graph, nodes, link.target), nodes[link.target].box
         if height is not None and box is not None:
-            carried.append(Carried(box, height))
+            is_hidden = link.plane is not None and nodes[name].planes[link.plane].hidden
+            carried.append(Carried(box, height, is_hidden))
     return carried
 
 
@@ -171,20 +180,10 @@ def standing_points(vertices: np.ndarray, height: float) -> np.ndarray:
 
 
 def furniture_pieces(points: np.ndarray, faces: np.ndarray, rests_at: float | None) -> list[np.ndarray]:
-    """Return the corner points (N, 3) of convex pieces of free furniture, from its mesh (V, 3) [m], (F, 3).
-
-    Where it stands at a height `rests_at` [m], none reaches below, and there is one foot more: the hull of what reaches
-    down there, as far as 10 cm above, 1 cm thick, so that legs of which the camera missed the ends carry it all the
-    same.
-    """
+    """Return the corner points (N, 3) of convex pieces of free furniture, from its mesh (V, 3) [m], (F, 3). Where it
+    stands at a height `rests_at` [m], none reaches below."""
     pieces = convex_pieces(points, faces)
-    if rests_at is None:
-        return pieces
-    for piece in pieces:
-        piece[:, 2] = np.maximum(piece[:, 2], rests_at)
-    low = points[points[:, 2] < rests_at + FOOT_REACH]
-    if len(np.unique(low[:, :2], axis=0)) >= FEWEST_CORNERS - 1:
-        foot = np.concatenate([low, low])
-        foot[:, 2] = np.repeat([rests_at, rests_at + FOOT_THICKNESS], len(low))
-        pieces.append(foot)
+    if rests_at is not None:
+        for piece in pieces:
+            piece[:, 2] = np.maximum(piece[:, 2], rests_at)
     return pieces

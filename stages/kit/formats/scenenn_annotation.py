@@ -46,7 +46,7 @@ def read_annotation(path: Path) -> dict[int, AnnotatedLabel]:
     for number, element in enumerate(root.findall("label"), start=1):
         identity = (element.get("id") or "").strip()
         if not (identity.isascii() and identity.isdigit() and len(identity) < 11 and int(identity) <= LARGEST_ID):
-            raise BadInput(f"{path}: label {number}: id {identity[:40]!r} is no label of a mesh", hint=HINT)
+            raise BadInput(f"{path}: label {number}: id {identity[:40]!r} is not a label of a mesh", hint=HINT)
         if int(identity) in labels:
             raise BadInput(f"{path}: label {number}: id {identity} occurs twice", hint=HINT)
         text, nyu_class = ((element.get(name) or "").strip().lower() for name in ("text", "nyu_class"))

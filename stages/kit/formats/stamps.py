@@ -55,7 +55,7 @@ def exact_stamps(texts: Sequence[str], where: Sequence[str]) -> StampColumn:
     column = read_column(texts)
     for text, place, stamp in zip(texts, where, column.stamps, strict=True):
         if stamp is None and _number(text) is None:
-            raise BadInput(f"{place}: {text!r:.40} is no time stamp")
+            raise BadInput(f"{place}: {text!r:.40} is not a time stamp")
         if stamp is None:
             raise BadInput(f"{place}: time stamp {text:.40} is not between 0 and {LATEST_STAMP} seconds")
     return column

@@ -101,7 +101,7 @@ def read_stamped_rows(path: Path) -> StampedRows:
     notes = (f"{path.name}: {column.note}",) if column.note else ()
     if problems:
         listed = ", ".join(f"{reason}: {count}" for reason, count in sorted(problems.items()))
-        bad_lines = f"WARNING: {sum(problems.values())} of {len(rows)} lines of {path.name} are no poses ({listed})"
+        bad_lines = f"WARNING: {sum(problems.values())} of {len(rows)} lines of {path.name} are not poses ({listed})"
         notes = (*notes, bad_lines)
     return StampedRows(np.array(stamps, np.int64), np.array(poses).reshape(-1, 4, 4), notes)
 

@@ -1,1 +1,1 @@
-"""Language models: one chat, several backends, replies that are data (docs/LANGUAGE.md)."""
+"""Language models: one chat, several backends, replies that are data (docs/INTERPRET.md)."""

@@ -25,7 +25,7 @@ class Text:
         try:
             self.text.encode()
         except UnicodeEncodeError:
-            raise BadInput("a message to a language model is no valid Unicode", hint="check the names in it") from None
+            raise BadInput("a message to a language model is not valid Unicode", hint="check the names in it") from None
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Image:
 
     def __post_init__(self) -> None:
         if not self.data.startswith((PNG_START, JPEG_START)) or not may_be_decoded(self.data):
-            raise BadInput("an image in a message is no sound PNG or JPEG", hint="encode it as one of these")
+            raise BadInput("an image in a message is not a sound PNG or JPEG", hint="encode it as one of these")
         if len(self.data) > LARGEST_IMAGE_BYTES:
             raise BadInput(
                 f"an image in a message has {len(self.data)} bytes, more than {LARGEST_IMAGE_BYTES}", hint="scale it"

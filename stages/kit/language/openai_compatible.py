@@ -29,7 +29,7 @@ NOT_UNDERSTOOD = frozenset({400, 422})
 STUMBLED = 500
 """HTTP status of llama.cpp when a reply that it holds to a schema is cut at the largest number of tokens. The same
 question is then asked in a lower form, that once, so that the cut reply comes back and the model is told."""
-REFUSED_HINT = "see docs/LANGUAGE.md: does --base-url end with /v1, is --model one that it serves, is the key set?"
+REFUSED_HINT = "see docs/INTERPRET.md: does --base-url end with /v1, is --model one that it serves, is the key set?"
 
 Form = Literal["json_schema", "json_object", "text"]
 FORMS: tuple[Form, ...] = ("json_schema", "json_object", "text")
@@ -156,7 +156,7 @@ def _judge(answer: Answer) -> None:
         content = envelope["choices"][0]["message"].get("content")
         sound = content is None or isinstance(content, str | list)
     except (ValueError, RecursionError):
-        raise TryAgain("an answer that is no JSON") from None
+        raise TryAgain("an answer that is not JSON") from None
     except (LookupError, TypeError, AttributeError):
         sound = False
     if not sound:

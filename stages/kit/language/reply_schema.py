@@ -62,7 +62,7 @@ def schema_from(name: str, document: dict[str, Any]) -> ReplySchema[Any]:
     try:
         Draft202012Validator.check_schema(document)
     except SchemaError as error:
-        raise ValueError(f"{name} is no JSON schema: {error.message}") from None
+        raise ValueError(f"{name} is not a JSON schema: {error.message}") from None
     validator = Draft202012Validator(document, registry=Registry())
 
     def read(value: Any) -> Any:

@@ -101,7 +101,7 @@ class Transcript:
 
 def read_transcript(path: Path) -> Transcript:
     """Read a transcript. Raises BadInput naming the line that is no exchange, or whose prompt was changed."""
-    hint = "record it again (docs/LANGUAGE.md)"
+    hint = "record it again (docs/INTERPRET.md, Language models)"
     lines = file_content(path, LARGEST_TRANSCRIPT, hint=hint).split(b"\n")
     exchanges = []
     for number, line in enumerate(lines, 1):

@@ -48,7 +48,7 @@ class EmbeddedEncoder:
         try:
             self.vocabulary = frozenset(map(str, json.loads(metadata.get("vocabulary", ""))))
         except (ValueError, TypeError, RecursionError):
-            raise BadInput(f"{path}: its vocabulary is no list of words", hint=_OTHER) from None
+            raise BadInput(f"{path}: its vocabulary is not a list of words", hint=_OTHER) from None
         network = TwoTowers()
         put_tensors(network, tensors, str(path), _OTHER)
         self._network = network.eval()

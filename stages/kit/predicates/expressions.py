@@ -83,7 +83,7 @@ def _tree(listed: list[Listed], where: str, depth: int) -> Tree:
             try:
                 number = float(part)
             except ValueError:
-                raise refuse(where, f"{part[:30]!r} is no number") from None
+                raise refuse(where, f"{part[:30]!r} is not a number") from None
             if not math.isfinite(number) or abs(number) > 1e9:
                 raise refuse(where, f"{part[:30]!r} is too large")
             branches.append(number)

@@ -34,7 +34,7 @@ INDEPENDENT_SHARE = 0.01
 """Neighbouring residuals are alike: so many of them count as independent when uncertainty is stated."""
 SYSTEMATIC_DEPTH = 0.005
 """Error of a depth camera that stays from frame to frame (lens, scale, bending of planes), as a share of the depth. It
-keeps near surfaces, whose noise is a millimetre, from outweighing everything else. Chosen: docs/POSES.md."""
+keeps near surfaces, whose noise is a millimetre, from outweighing everything else. Chosen: docs/MAPPING.md."""
 SMALLEST_STEP = 2e-5
 """Steps below this end a level [rad and m]."""
 SUMS = 8

@@ -74,7 +74,7 @@ class BoundedServer(ThreadingHTTPServer):
                 f"{host:.80}:{port}: {getattr(error, 'strerror', None) or error}", hint="choose another port or address"
             ) from None
         except (ValueError, TypeError):  # half a character, a zero byte, a label of more than 63 letters
-            raise UsageError(f"{host!r:.80} is no name of a host") from None
+            raise UsageError(f"{host!r:.80} is not a host name") from None
 
     def server_bind(self) -> None:
         """Bind, without asking a name server what this machine is called."""
@@ -287,7 +287,7 @@ class BoundedHandler(BaseHTTPRequestHandler):
         if self.headers.get("Transfer-Encoding") is not None or not lengths:
             self._refuse_unread(411, "a Content-Length is needed")
         elif len(lengths) > 1 or not (declared.isascii() and declared.isdigit()):
-            self._refuse_unread(400, "Content-Length is no number")
+            self._refuse_unread(400, "Content-Length is not a number")
         elif len(declared) > 15 or int(declared) > self.largest_body:
             self._refuse_unread(413, f"more than {self.largest_body} bytes")
         else:

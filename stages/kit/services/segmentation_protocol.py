@@ -1,4 +1,4 @@
-"""Version 1 of the segmentation protocol (docs/SEGMENTATION.md): what is said over HTTP, and how it is judged.
+"""Version 1 of the segmentation protocol (docs/FORMATS.md): what is said over HTTP, and how it is judged.
 
 Everything that comes over the wire is checked here, on both sides, and nothing of it is executed.
 """
@@ -241,7 +241,7 @@ def split_multipart(body: bytes, content_type: str) -> dict[str, bytes]:
     ]
     boundary = boundaries[0].strip('"').encode("ascii", "replace") if boundaries else b""
     if kind.strip().lower() != "multipart/form-data" or not 0 < len(boundary) <= 70:
-        _refuse(f"content type {content_type!r:.80} is no multipart/form-data with a boundary")
+        _refuse(f"content type {content_type!r:.80} is not multipart/form-data with a boundary")
     pieces = (b"\r\n" + body).split(b"\r\n--" + boundary, MOST_PARTS + 2)
     if len(pieces) < 3 or not pieces[-1].startswith(b"--") or len(pieces) - 2 > MOST_PARTS:
         _refuse("its parts are torn, or too many")
@@ -295,7 +295,7 @@ def _millimetres(data: bytes) -> np.ndarray | None:
 
 def _decode(name: str, data: bytes, camera: Camera, decode: Any) -> np.ndarray:
     if not may_be_decoded(data):
-        _refuse(f"the part `{name}` is no image, or declares more pixels than it holds")
+        _refuse(f"the part `{name}` is not an image, or declares more pixels than it holds")
     if image_size(data) != (camera.width, camera.height):
         _refuse(f"the part `{name}` does not have the size that the intrinsics state")
     try:
@@ -313,14 +313,14 @@ def _json_object(body: bytes, content_type: str) -> dict[str, Any]:
     try:
         data = json.loads(body.decode("utf-8"), parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
-        _refuse(f"it is no JSON ({str(error).splitlines()[0]:.80})")
+        _refuse(f"it is not JSON ({str(error).splitlines()[0]:.80})")
     if not isinstance(data, dict):
-        _refuse("it is no JSON object")
+        _refuse("it is not a JSON object")
     return data
 
 
 def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a number of JSON")
 
 
 def _check_protocol(data: Mapping[str, Any]) -> None:
@@ -330,16 +330,16 @@ def _check_protocol(data: Mapping[str, Any]) -> None:
 
 def _segments(rows: Any, categories: Mapping[int, Category]) -> dict[int, ReplySegment]:
     if not isinstance(rows, list):
-        _refuse("segments_info is no list")
+        _refuse("segments_info is not a list")
     if len(rows) > MOST_SEGMENTS:
         _refuse(f"{len(rows)} segments, more than {MOST_SEGMENTS}")
     segments: dict[int, ReplySegment] = {}
     for row in rows:
         if not isinstance(row, dict):
-            _refuse("an entry of segments_info is no object")
+            _refuse("an entry of segments_info is not an object")
         segment_id, class_id, score = row.get("id"), row.get("category_id"), row.get("score", 1.0)
         if not _is_integer(segment_id) or not 0 < segment_id <= LARGEST_ID:
-            _refuse(f"segment id {segment_id!r:.40} is no integer in 1..{LARGEST_ID}")
+            _refuse(f"segment id {segment_id!r:.40} is not an integer in 1..{LARGEST_ID}")
         if segment_id in segments:
             _refuse(f"segment id {segment_id} comes twice")
         if not _is_integer(class_id) or class_id not in categories:
@@ -363,7 +363,7 @@ def _base64(text: Any) -> bytes:
     try:
         return base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):
-        _refuse("panoptic_png is no base64")
+        _refuse("panoptic_png is not base64")
 
 
 def _is_integer(value: Any) -> TypeGuard[int]:
@@ -372,13 +372,13 @@ def _is_integer(value: Any) -> TypeGuard[int]:
 
 def _integer(value: Any) -> int:
     if not _is_integer(value):
-        raise ValueError(f"{value!r:.40} is no integer")
+        raise ValueError(f"{value!r:.40} is not an integer")
     return value
 
 
 def _text(value: Any, subject: str) -> str:
     if not isinstance(value, str) or not 0 < len(value) <= LONGEST_TEXT or not value.isprintable():
-        _refuse(f"{subject} is no printable text of at most {LONGEST_TEXT} characters")
+        _refuse(f"{subject} is not printable text of at most {LONGEST_TEXT} characters")
     return value
 
 

@@ -28,7 +28,7 @@ FINGERS = 2
 SHORTEST_AXIS = 1e-6
 MOST_RADIANS, MOST_DEGREES = 4 * np.pi, 1500.0
 """No joint turns twice round to either side of zero, nor at two turns a second: what is more is in degrees."""
-HINT = "docs/MOTION.md (Robots) lists what a description says"
+HINT = "docs/ROBOT.md lists what a description says"
 
 
 @dataclass(frozen=True)

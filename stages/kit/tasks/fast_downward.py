@@ -83,7 +83,7 @@ def read_plan(text: str, actions: dict[str, GroundAction]) -> list[GroundAction]
             continue
         inner = step.removeprefix("( ").removesuffix(" )")
         if step != f"( {inner} )" or inner not in actions:
-            raise BadInput(f"plan, line {number}: {line.strip()[:60]!r} is no action of the task", hint=INSTEAD)
+            raise BadInput(f"plan, line {number}: {line.strip()[:60]!r} is not an action of the task", hint=INSTEAD)
         plan.append(actions[inner])
     return plan
 

@@ -184,7 +184,7 @@ def _schema(part: list[Expression], types: dict[str, str], predicates: dict[str,
         _check_atom(atom, predicates, subject)
         for term in atom[1:]:
             if term not in variables:
-                raise refuse(f"{subject}: {term!r} is no parameter of it")
+                raise refuse(f"{subject}: {term!r} is not a parameter of it")
     return Schema(name, parameters, positive, add, delete, negative)
 
 

@@ -33,7 +33,7 @@ def parse_expression(text: str) -> list[Expression]:
             closed = stack.pop()
             stack[-1].append(closed)
         elif _WORD.fullmatch(token) is None:
-            raise refuse(f"{token[:30]!r} is no name")
+            raise refuse(f"{token[:30]!r} is not a name")
         else:
             stack[-1].append(token)
     if len(stack) != 1 or len(stack[0]) != 1 or not isinstance(stack[0][0], list):

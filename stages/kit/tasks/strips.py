@@ -76,6 +76,12 @@ def _ground(atoms: tuple[Atom, ...], binding: dict[str, str]) -> frozenset[Atom]
     return frozenset((atom[0], *(binding.get(term, term) for term in atom[1:])) for atom in atoms)
 
 
+def bound(schema: Schema, binding: dict[str, str]) -> GroundAction:
+    """Return the action of a schema with these values of all its variables, in the order of its parameters."""
+    add, delete = _ground(schema.add, binding), _ground(schema.delete, binding)
+    return GroundAction(schema.name, tuple(binding.values()), _ground(schema.preconditions, binding), add, delete - add)
+
+
 def ground(domain: Domain, problem: Problem) -> list[GroundAction]:
     """Return every action whose static preconditions hold, in the order of the schemas and of the problem's objects.
 
@@ -149,11 +155,7 @@ def _ground_schema(
                 yield from extend({**binding, name: value})
 
     for binding in extend({}):
-        add, delete = _ground(schema.add, binding), _ground(schema.delete, binding)
-        action = GroundAction(
-            schema.name, tuple(binding.values()), _ground(schema.preconditions, binding), add, delete - add
-        )
-        yield action, _ground(schema.negative, binding)
+        yield bound(schema, binding), _ground(schema.negative, binding)
 
 
 def apply_action(state: frozenset[Atom], action: GroundAction) -> frozenset[Atom]:

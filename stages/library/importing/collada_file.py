@@ -123,7 +123,7 @@ class _Reader:
         try:
             values = long_row(text or "", np.float64, MOST_INDICES, f"{self.where}: {subject}")
         except ValueError:
-            raise BadInput(f"{self.where}: {subject} holds what is no number") from None
+            raise BadInput(f"{self.where}: {subject} holds a value that is not a number") from None
         if values.size == 0:
             raise BadInput(f"{self.where}: {subject} is empty")
         return values
@@ -135,7 +135,7 @@ class _Reader:
 
     def _count(self, text: str) -> int:
         if not (text.isascii() and text.isdigit() and len(text) < 4):
-            raise BadInput(f"{self.where}: {text!r:.40} is no stride or offset")
+            raise BadInput(f"{self.where}: {text!r:.40} is not a stride or offset")
         return int(text)
 
     def _transform(self, node: ElementTree.Element) -> np.ndarray:
@@ -198,7 +198,7 @@ class _Reader:
     ) -> Iterator[ColladaPatch]:
         mesh = geometry.find("mesh")
         if mesh is None:
-            self.left_out.add("geometry that is no mesh")
+            self.left_out.add("geometry that is not a mesh")
             return
         self._step(len(mesh))
         for element in mesh:
@@ -293,7 +293,7 @@ class _Reader:
             if element.tag == "polylist":
                 counts = long_row(element.findtext("vcount") or "", np.int64, MOST_INDICES, self.where)
         except (ValueError, OverflowError):  # an index of more than 64 bits
-            raise BadInput(f"{self.where}: {element.tag}: indices are no numbers") from None
+            raise BadInput(f"{self.where}: {element.tag}: indices are not numbers") from None
         joined = np.concatenate(rows) if rows else np.zeros((0, width), np.int64)
         if len(counts) and (
             counts.min() < 0 or counts.max() > len(joined) or float(counts.astype(float).sum()) > len(joined)

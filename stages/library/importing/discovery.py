@@ -57,7 +57,7 @@ def find_models(folder: SourceFolder) -> Iterator[SourceModel | Unread]:
             continue
         if not _is_text(path):
             if path.suffix.lower() in (*MESH_SUFFIXES, *DESCRIPTIONS):
-                yield Unread(folder.relative(path), "its name is no UTF-8 (rename it)")
+                yield Unread(folder.relative(path), "its name is not UTF-8 (rename it)")
             continue
         for model in _read_claimed(folder, path, claimed):
             count += 1

@@ -149,7 +149,7 @@ def _named(folder: SourceFolder, path: Path, name: str, what: str) -> bytes:
         try:
             return base64.b64decode(name.partition(",")[2], validate=True)
         except ValueError:  # binascii.Error, or letters that are none of ASCII
-            raise BadInput(f"{path}: a {what} is no base64") from None
+            raise BadInput(f"{path}: a {what} is not base64") from None
     file = folder.find(name, path.parent) or folder.find(unquote(name), path.parent)
     if file is None:
         raise BadInput(f"{path}: {what} {name!r:.60} is not in the folder")

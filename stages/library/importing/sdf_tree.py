@@ -98,7 +98,7 @@ class SdfTree:
         root = None if file is None else self.folder.read_xml(file)
         model = None if root is None else root.find("model")
         if file is None or root is None or model is None:
-            self.findings.append(f"included model {uri!r:.80} is not in the folder, or is no SDF: left out")
+            self.findings.append(f"included model {uri!r:.80} is not in the folder, or is not an SDF: left out")
             return
         placed = ElementTree.Element("include", dict(include.attrib))
         own_pose = include.find("pose") is not None

@@ -173,7 +173,7 @@ def list_of_numbers(text: str | None, where: str) -> np.ndarray:
         values = np.array((text or "")[:LONGEST_ROW].split(), dtype=float)
     except ValueError:
         hint = "a xacro expression: let xacro write the URDF" if "${" in (text or "") else ""
-        raise BadInput(f"{where}: {text!r:.80} is no row of numbers", hint=hint) from None
+        raise BadInput(f"{where}: {text!r:.80} is not a row of numbers", hint=hint) from None
     if not np.isfinite(values).all() or (np.abs(values) > 1e30).any():
         raise BadInput(f"{where}: {text!r:.80} is not finite")
     return values

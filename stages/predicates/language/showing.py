@@ -37,7 +37,7 @@ def example_lines(file: LearnedDomainFile, name: str) -> Iterator[str]:
     of_name = [each for each in file.predicates if each.name == name]
     if not of_name:
         names = ", ".join(each.name for each in file.predicates)
-        raise UsageError(f"there is no predicate {name!r}", hint=f"choose of {names}")
+        raise UsageError(f"there is no predicate {name!r}", hint=f"choose one of {names}")
     yield from _predicate_lines(file, of_name[0])
     yield f"    {of_name[0].means}"
     for phrase in _phrases_of(file, of_name[0]):

@@ -14,7 +14,7 @@ from scenewright.schemas.outside import file_toml
 Layout = Literal[
     "yolo-seg", "yolo-objectness", "yolo-end-to-end", "instances", "query-instances", "panoptic", "semantic"
 ]
-HINT = "say what goes in and what comes out with --sidecar FILE.toml (docs/SEGMENTATION.md)"
+HINT = "say what goes in and what comes out with --sidecar FILE.toml (docs/FORMATS.md, Networks in ONNX and TFLite)"
 BY_FOLDER = "run it in a script of your own and give its masks with --backend masks (docs/MASKS.md)"
 LARGEST_FILE = 2**20
 """Most bytes of a sidecar."""
@@ -98,7 +98,7 @@ INPUTS: Mapping[str, Mapping[str, Any]] = {
 
 def read_sidecar(path: Path) -> Sidecar:
     """Read a TOML sidecar. Raises BadInput when it is none, or does not name the outputs of its layout."""
-    hint = "see docs/SEGMENTATION.md"
+    hint = "see docs/FORMATS.md, Networks in ONNX and TFLite"
     try:
         values = file_toml(path, LARGEST_FILE, hint=hint)
         told = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
@@ -111,7 +111,7 @@ def read_sidecar(path: Path) -> Sidecar:
     if set(sidecar.outputs) not in (set(roles), set(roles) - {"scores"}):
         raise BadInput(f"{path}: outputs are {sorted(sidecar.outputs)}, not {sorted(roles)}", hint=hint)
     if sidecar.size is not None and not all(0 < side <= 16384 for side in sidecar.size):
-        raise BadInput(f"{path}: size {sidecar.size} is no image's", hint=hint)
+        raise BadInput(f"{path}: size {sidecar.size} is not an image's", hint=hint)
     if not sidecar.scale > 0 or min(map(abs, sidecar.deviation)) == 0:
         raise BadInput(f"{path}: a scale or deviation of 0", hint=hint)
     return sidecar

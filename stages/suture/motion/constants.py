@@ -31,7 +31,7 @@ INTERVENTIONS = 2
 
 @dataclass(frozen=True)
 class OpenConstants:
-    """What the thesis uses and does not state; values chosen on tuning seeds 0 to 29 (docs/STITCH_TRIALS.md)."""
+    """What the thesis uses and does not state; values chosen on tuning seeds 0 to 29 (docs/STITCH.md)."""
 
     desired_length: float = 0.110
     """l_des of the cinch length beta = l_des - (i - 1) l_each [m]."""

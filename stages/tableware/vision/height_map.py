@@ -103,7 +103,7 @@ def check_images(color: np.ndarray, depth: np.ndarray, view: OverheadCamera) -> 
             "the camera does not look straight down on the table", hint="rectify the frame to the table plane first"
         )
     if not np.isfinite(depth).all():
-        raise BadInput("the depth image holds values that are no numbers", hint="use 0 where there is no depth")
+        raise BadInput("the depth image holds values that are not numbers", hint="use 0 where there is no depth")
 
 
 def height_map(

@@ -115,7 +115,7 @@ def see(
     middle = float(np.median(some[some > 0.0])) if (some > 0.0).any() else 0.0
     if middle > MILLIMETRES:
         raise BadInput(
-            f"the median depth is {middle:.4g}: that is no table in metres",
+            f"the median depth is {middle:.4g}: that is not a table in metres",
             hint="give the file's scale: --depth-scale 0.001 where it is in mm",
         )
     pose = None if isinstance(camera, Camera) else np.asarray(camera.world_from_camera, dtype=float)

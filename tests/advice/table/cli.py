@@ -224,6 +224,13 @@ ROWS = [
         "view {room}/sequence --save page.html",
     ),
     Tried(
+        "cli/explaining/explaining.py",
+        "lists its names",
+        "explain {fridge}/graph %",
+        "explain {fridge}/graph",
+        shows="fridge_",
+    ),
+    Tried(
         "cli/viewing/rerun_canvas.py",
         "pip install",
         "view {room}/sequence --save log.rrd",

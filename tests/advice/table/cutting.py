@@ -36,7 +36,7 @@ def empty_recording(folder: Path) -> None:
 
 
 ROWS = [
-    goal("is no number with a category", "some slices", "6 slices, 8 cubes"),
+    goal("is not a number with a category", "some slices", "6 slices, 8 cubes"),
     goal("there is no category", "6 wedges", "6 cubes"),
     goal("are named twice", "2 slices, 3 slices", "5 slices"),
     goal("--goal: 0 ", "2 slices and 0 cubes", "2 slices"),
@@ -64,7 +64,7 @@ ROWS = [
     ),
     Tried(
         OPTIONS,
-        "both say what is cut",
+        "both set the object",
         f"{DEMONSTRATED} --dry-run --mesh {{cut}}/loaf.stl",
         f"{PLANNING} --dry-run --goal '6 slices' --mesh {{cut}}/loaf.stl",
     ),

@@ -27,7 +27,7 @@ def corrected(folder: Path) -> None:
 ROWS = [
     Tried(
         PARAMETERS,
-        "is no multiple of 16",
+        "is not a multiple of 16",
         f"{ASKED} --lowest-disparity 0 --levels 20",
         f"{ASKED} --lowest-disparity 0 --levels 32",
     ),

@@ -273,7 +273,7 @@ ROWS = [
     ),
     Tried(
         ENGINE + "known_models.py",
-        "is no network listed here",
+        "is not a network listed here",
         "models --check a.onnx",
         "models",
         code=3,

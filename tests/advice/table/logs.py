@@ -118,7 +118,7 @@ ROWS = [
     refused(FILES, "intrinsics are for", tum(CAMODOCAL.replace("96", "72"), "lens.yaml")),
     refused(FILES, "are those of no camera", tum("0 0 1 1")),
     NotTried(
-        FILES, "intrinsics are no numbers", "readers refuse words where numbers stand before they ask for a camera"
+        FILES, "intrinsics are not numbers", "readers refuse words where numbers stand before they ask for a camera"
     ),
     refused("stages/ingest/layouts/nerfstudio/reader.py", "neither fl_x nor", transforms(fl_x=None, fl_y=None)),
     refused("stages/ingest/layouts/tum/reader.py", "intrinsics are not known", tum(None)),

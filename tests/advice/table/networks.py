@@ -327,7 +327,7 @@ ROWS = [
     ),
     Tried(
         f"{BACKENDS}/network/backend.py",
-        "is no checkpoint of the network of our own",
+        "is not a checkpoint of the network of our own",
         f"{SEGMENT} --backend network --weights yolo.onnx",
         f"{BY_ONNX} --weights yolo.onnx",
         given=yolo,

@@ -98,7 +98,7 @@ ROWS = [
     ),
     Tried(
         SEEING,
-        "no table in metres",
+        "not a table in metres",
         f"{BY_FILE} {{table}}/../millimetres.npy",
         f"{BY_FILE} {{table}}/../millimetres.npy --depth-scale 0.001",
         code=3,

@@ -17,7 +17,7 @@ from benchmarks.figures.pages import ROOT, homes, pages, render
 from benchmarks.figures.unmarked import CLEARLY_MEASURED, GIVEN, GIVEN_MARKER, MEASURED, unmarked
 
 RESULTS = ROOT / "docs" / "results"
-WORDS = 900
+WORDS = 700
 """README welcomes; the rest stands in docs/."""
 
 
@@ -81,25 +81,11 @@ def test_every_page_of_results_is_linked_from_the_index() -> None:
     ] == []
 
 
-def words_of(text: str) -> int:
-    """Return how many words a page has, without its generated tables and link targets."""
-    text = re.sub(r"<!-- (table|rows|headlines).*?<!-- /\1 -->", "", text, flags=re.DOTALL)
-    text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r"\]\([^)]*\)", "]", text)
-    return len([word for word in text.split() if re.search(r"\w", word)])
-
-
 def test_readme_is_short() -> None:
     text = re.sub(r"<!--.*?-->", "", (ROOT / "README.md").read_text(), flags=re.DOTALL)
     text = re.sub(r"\]\([^)]*\)", "]", text)
     words = [word for word in text.split() if re.search(r"\w", word)]
     assert len(words) <= WORDS
-
-
-def test_results_decisions_and_changes_are_short() -> None:
-    assert sum(words_of(page.read_text()) for page in RESULTS.glob("*.md")) <= 16_000
-    assert words_of((ROOT / "docs" / "DECISIONS.md").read_text()) <= 1_200
-    assert len((ROOT / "CHANGELOG.md").read_text().splitlines()) <= 50
 
 
 CONTENT: dict[str, Any] = {

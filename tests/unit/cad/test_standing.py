@@ -124,7 +124,7 @@ def test_a_model_that_fills_free_space_is_told(tmp_path, library):
 
 
 def test_a_map_without_volume_knows_no_free_space(tmp_path):
-    assert load_free_space(write_map(tmp_path, {1: box_mesh((0, 0, 0), (1, 1, 1))}, {1: "box"})) is NOTHING_KNOWN
+    assert load_free_space(write_map(tmp_path, {1: box_mesh((0, 0, 0), (1, 1, 1))}, {1: "box"})) == NOTHING_KNOWN
 
 
 def test_parts_take_the_colours_of_their_vertices(library):

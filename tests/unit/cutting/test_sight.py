@@ -126,7 +126,7 @@ def _change(path: Path, text: str, by: str) -> None:
         (lambda f: (f / "camera.json").unlink(), "holds no pictures"),
         (lambda f: (f / "camera.json").write_text("{"), "camera.json"),
         (lambda f: _change(f / "camera.json", '"width": ', '"width": 1'), "the camera"),
-        (lambda f: _change(f / "camera.json", '"width": ', '"width": -'), "no camera"),
+        (lambda f: _change(f / "camera.json", '"width": ', '"width": -'), "not a camera"),
     ],
 )
 def test_pictures_that_cannot_be_read_are_refused(

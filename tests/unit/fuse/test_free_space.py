@@ -78,3 +78,17 @@ def test_free_cells_lie_between_the_camera_and_the_surface(depth: float, turn: f
     middles = (8 * free.coordinates[blocks] + inside + 0.5) * CELL
     seen = (middles - pose[:3, 3]) @ pose[:3, :3]
     assert (seen[:, 2] > -CELL).all() and (seen[:, 2] < depth - (SHORT - 1.0) * CELL * 0.8 + CELL).all()
+
+
+def test_the_map_keeps_what_was_seen_through() -> None:
+    """What is written says of every cell what the grid says, blocks sorted by z, y, x."""
+    free = looked(np.full((64, 80), 2.0))
+    arrays = free.as_arrays()
+    blocks, edge = arrays["block_coordinates"], float(arrays["edge"][0])
+    assert edge == CELL and blocks.tolist() == sorted(blocks.tolist(), key=lambda c: c[::-1])
+    cells = np.unpackbits(arrays["free"], axis=1, bitorder="little").astype(bool)
+    assert cells.shape == (len(blocks), 512) and cells.any(axis=1).all()
+    inner = np.stack(np.meshgrid(*[np.arange(8)] * 3, indexing="ij"), -1)[..., ::-1].reshape(-1, 3)
+    middles = ((blocks[:, None] * 8 + inner + 0.5) * edge).reshape(-1, 3)
+    assert np.array_equal(free.is_free(middles), cells.ravel())
+    assert cells.sum() == (free.frames[: free.count] >= FEWEST).sum()

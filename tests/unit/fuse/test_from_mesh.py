@@ -236,7 +236,7 @@ def test_broken_scans(tmp_path: Path) -> None:
     segments, group = "scene_vh_clean_2.0.010000.segs.json", "scene.aggregation.json"
     cases = [
         (change(segments, "[", "[7, "), "segments for the"),
-        (change(segments, "[", '["7", '), "is no list of integers"),
+        (change(segments, "[", '["7", '), "is not a list of integers"),
         (change(segments, "[2,", "[-2,"), "not in 0..2"),
         (change(segments, "{", ""), "no JSON"),
         (change(group, "segGroups", "groups"), "lists no segGroups"),

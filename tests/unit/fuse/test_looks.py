@@ -91,12 +91,14 @@ def test_scores_are_means_over_the_looks_that_saw_the_thing() -> None:
     for _ in range(3):
         flat(looks, (segment(1, TABLE, 1, 0.9),), whole)
     flat(looks, (segment(1, TABLE, 1, 0.5), segment(2, CUP, 2, 0.8)), middle)
-    said = looks.said_of(vertices, instance)
+    said = looks.said_of(looks.on(vertices, instance))
     assert said[1].looks == said[2].looks == 4.0
     assert said[1].scores == {TABLE: pytest.approx((3 * 0.9 + 0.5) / 4)}
     assert said[2].scores == {CUP: pytest.approx(0.2)}
-    assert set(looks.said_of(vertices, np.zeros_like(instance))) == set()
-    assert Looks(VOXEL).said_of(vertices, instance) == {} == looks.said_of(np.zeros((0, 3)), np.zeros(0, int))
+    assert set(looks.said_of(looks.on(vertices, np.zeros_like(instance)))) == set()
+    empty = Looks(VOXEL)
+    assert empty.said_of(empty.on(vertices, instance)) == {}
+    assert looks.said_of(looks.on(np.zeros((0, 3)), np.zeros(0, int))) == {}
 
 
 def test_of_many_looks_some_are_kept_evenly_and_say_the_same() -> None:
@@ -110,4 +112,4 @@ def test_of_many_looks_some_are_kept_evenly_and_say_the_same() -> None:
         kept=(Look(np.floor(vertices / VOXEL).astype(np.int32), np.ones(len(vertices), np.uint16), ((TABLE, 1.0),)),)
         * 5,
     )
-    assert looks.said_of(vertices, instance)[1] == Said(5.0, {TABLE: 1.0})
+    assert looks.said_of(looks.on(vertices, instance))[1] == Said(5.0, {TABLE: 1.0})

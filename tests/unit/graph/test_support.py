@@ -248,3 +248,42 @@ def test_furniture_within_furniture_of_its_class_is_a_piece_and_what_nobody_name
     assert fragments(pair("sofa")) == {"sofa_2": "sofa_1"}
     assert fragments(pair("bowl", movable=True)) == {}
     assert fragments(pair("object")) == {}
+
+
+def filled(low, high):
+    """Points all over a box."""
+    axes = [np.linspace(a, b, 6) for a, b in zip(low, high, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "board_at", "expected"),
+    [
+        ((0.9, 0.3, 0.4), (0.93, 0.33, 0.8), None, True),  # a post in the air, 3 cm thick: it would tip over
+        ((0.9, 0.3, 0.4), (0.93, 0.33, 0.8), 0.39, False),  # a rod that stands on a board
+        ((0.1, 0.1, 0.4), (0.8, 0.35, 0.43), None, False),  # a tray on something that nobody saw
+        ((0.3, 0.1, 0.4), (0.36, 0.16, 0.52), 0.39, False),  # a bottle on a board
+        ((0.3, 0.1, 0.4), (0.36, 0.16, 0.46), None, False),  # a cup whose foot nobody saw: too stout
+        ((0.1, 0.1, 0.4), (0.5, 0.35, 0.7), None, False),  # a coffee machine
+        ((0.9, 0.6, 0.4), (0.93, 0.63, 0.8), None, False),  # a post in front of the shelf
+    ],
+)
+def test_a_board_or_post_that_would_fall_by_itself_is_a_piece_of_what_is_around_it(low, high, board_at, expected):
+    whole = entity("shelf_1", box_from_bounds((0, 0, 0), (1, 0.4, 1.8)), class_name="shelf", movable=False)
+    if board_at is not None:
+        patch = level_patch(SQUARE * [1.0, 0.4], board_at, hidden=False)
+        whole = replace(whole, patches=(patch,))
+    whole = replace(whole, points=filled((0, 0, 0), (1, 0.4, 1.8)).repeat(2, axis=0))
+    piece = entity("object_2", box_from_bounds(low, high), class_name="object", movable=False)
+    found = fragments([whole, replace(piece, points=filled(low, high))])
+    assert found == ({"object_2": "shelf_1"} if expected else {})
+
+
+@pytest.mark.parametrize(("low", "parent"), [(0.78, "object_2"), (0.70, "floor_1")])
+def test_what_seems_to_begin_below_a_glossy_top_stands_on_it(low, parent):
+    """A top at 0.9 m that gave depth at its edge; a thing up to 1.1 m, of which more is above than below, or less."""
+    floor = solid("floor_1", (-3, -3, -0.1), (3, 3, 0.0), class_name="floor", node_type="layout", movable=False)
+    edge = level_patch(np.array([[0, 0], [2.0, 0], [2.0, 0.1], [0, 0.1]]), 0.9, hidden=False)
+    counter = entity("object_2", box_from_bounds((0, 0, 0), (2, 0.6, 0.9)), [edge], "object", movable=False)
+    thing = entity("object_3", box_from_bounds((0.8, 0.3, low), (1.1, 0.5, 1.1)), (), "object", movable=False)
+    assert candidates_for(thing, [floor, counter, thing], GraphParameters())[0].parent == parent

@@ -239,7 +239,7 @@ def test_what_is_no_container(tmp_path: Path) -> None:
     assert container_of(tmp_path) is None
     with pytest.raises(BadInput, match="there is no such log"):
         open_message_log(tmp_path / "missing", salvage=True)
-    with pytest.raises(BadInput, match="is no MCAP file"):
+    with pytest.raises(BadInput, match="is not an MCAP file"):
         open_message_log(tmp_path / "words.mcap", salvage=True)
     with pytest.raises(BadInput, match="neither MCAP nor a ROS bag"):
         open_message_log(tmp_path / "images", salvage=True)

@@ -166,7 +166,7 @@ def test_a_baseline_in_a_unit_that_is_not_clear_is_asked_for(tmp_path: Path, uni
     log = write_pair(tmp_path / "log", spots(LEFT, POINTS), spots(LEFT, in_right(POINTS, apart)))
     _opencv_file(log / "calibration.yaml", LEFT, LEFT, apart, unit, 0, 0, 0, 0)
     if metres is None:
-        with pytest.raises(BadInput, match="stand 6 apart, too far for metres") as error:
+        with pytest.raises(BadInput, match="baseline is 6, too long for metres") as error:
             open_log(log, IngestParameters())
         assert "--baseline 0.06 if it is in centimetres, --baseline 0.006 if in millimetres" in str(error.value.hint)
     else:

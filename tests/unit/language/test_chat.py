@@ -52,8 +52,8 @@ def test_objects_are_found(text: str, found: list[Any]) -> None:
         ('{"a": [1, {"b": 2}', "cut short"),
         ('{"a": "b', "cut short"),
         ('{"a": 1,}', "malformed"),
-        ('{"a": NaN}', "NaN is no number"),
-        ('{"plan": [{"b": 1e999}, {"b": 1}]}', "no finite number"),
+        ('{"a": NaN}', "NaN is not a number"),
+        ('{"plan": [{"b": 1e999}, {"b": 1}]}', "not a finite number"),
         ('{"a": 1, "a": 2}', "says a name twice"),
         ('{"a": ' + "9" * 400 + "}", "a number of 400 digits"),
         ('{"a": ' + '{"a": ' * 30_000, "nested too deeply"),
@@ -129,7 +129,7 @@ def test_a_json_schema_as_it_stands() -> None:
     with pytest.raises(DoesNotFollow) as caught:
         schema.read({"n": "x" * 5000})
     assert len(str(caught.value)) <= 450
-    with pytest.raises(ValueError, match="is no JSON schema"):
+    with pytest.raises(ValueError, match="is not a JSON schema"):
         schema_from("bad", {"type": "nothing"})
 
 
@@ -233,9 +233,9 @@ def test_images_are_checked_and_digested() -> None:
     digests = {Request((say("user", "x", Image(data)),), SCHEMA, "m", 0.0, 9).digest for data in (png, other, png)}
     assert len(digests) == 2
     for wrong in (b"", b"GIF89a", png[:20], b"\xff\xd8\xff"):
-        with pytest.raises(BadInput, match="no sound PNG or JPEG"):
+        with pytest.raises(BadInput, match="not a sound PNG or JPEG"):
             Image(wrong)
-    with pytest.raises(BadInput, match="no valid Unicode"):
+    with pytest.raises(BadInput, match="not valid Unicode"):
         say("user", "\udc80")
 
 

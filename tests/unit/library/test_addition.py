@@ -296,7 +296,7 @@ def test_dae_agrees_with_pycollada() -> None:
 def test_a_dae_index_of_more_than_64_bits_is_bad_input() -> None:
     text = dae(0.5, "Z_UP", (1.0, 2.0, 3.0))
     start = text.index("<p>") + 3
-    with pytest.raises(BadInput, match="indices are no numbers"):
+    with pytest.raises(BadInput, match="indices are not numbers"):
         parse_collada((text[:start] + "9" * 30 + " " + text[start:]).encode(), "a.dae")
 
 

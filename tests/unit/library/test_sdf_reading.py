@@ -158,7 +158,7 @@ TOLD = {
     "ball": (PLAIN.replace("revolute", "ball"), "joint 'hinge' is of type 'ball': held fast"),
     "not in the folder": (
         f"{PLAIN}<include><uri>model://far</uri></include>",
-        "included model 'model://far' is not in the folder, or is no SDF: left out",
+        "included model 'model://far' is not in the folder, or is not an SDF: left out",
     ),
     "no submesh": (
         PLAIN.replace(

@@ -54,7 +54,7 @@ def test_a_formula_is_its_alternatives(goal: str, ways: list[set[str]]) -> None:
 @pytest.mark.parametrize(
     ("goal", "message"),
     [
-        ("on cup_1", "no literal"),
+        ("on cup_1", "not a literal"),
         ("(forall (?c - spoon) (wet ?c))", "the scene has no 'spoon'"),
         ("(wet ?c)", "not bound"),
         ("(forall (?c - cup))", "takes variables and a part"),

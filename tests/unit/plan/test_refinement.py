@@ -89,7 +89,7 @@ def test_goal_literals(kitchen_model: tuple[WorldModel, ContactGraphFile]) -> No
         ("on(table_3, bottle_7)", "needs a item"),
         ("upon(bottle_7, table_3)", "no predicate"),
         ("on(bottle_7)", "2 arguments"),
-        ("put it there", "no literal"),
+        ("put it there", "not a literal"),
     ):
         with pytest.raises(UsageError, match=reason):
             parse_goal((text,), objects)

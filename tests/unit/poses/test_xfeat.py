@@ -38,7 +38,7 @@ def test_maps_are_read_between_the_middles_of_their_cells() -> None:
 def test_a_file_that_is_no_such_network(tmp_path: Path) -> None:
     file = tmp_path / "network.onnx"
     file.write_bytes(b"no network")
-    with pytest.raises(BadInput, match=r"network.onnx is no ONNX network") as caught:
+    with pytest.raises(BadInput, match=r"network.onnx is not an ONNX network") as caught:
         xfeat.XFeat(file)
     assert "xfeat" in caught.value.hint
 

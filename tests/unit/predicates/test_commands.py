@@ -113,7 +113,7 @@ def test_what_was_learned_is_shown_in_words(learned: Path, capsys: pytest.Captur
     assert run_command(["predicates", "show", str(learned), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["domain"] == "store_objects"
     assert run_command(["predicates", "show", str(learned), "--predicate", "odd"]) == 2
-    assert "choose of in_gripper" in capsys.readouterr().err
+    assert "choose one of in_gripper" in capsys.readouterr().err
     assert run_command(["predicates", "show", str(learned.parent)]) == 3
 
 

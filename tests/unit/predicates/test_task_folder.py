@@ -57,7 +57,7 @@ def test_a_folder_of_several_domains_gives_the_tasks_of_one(tmp_path: Path) -> N
         ({"objects": None}, "objects: Field required"),
         ({"goal_lits_gt": []}, "goal_lits_gt"),
         ({"goal_lits_gt": [["on", "coaster"]]}, "'on coaster' needs 2 objects"),
-        ({"goal_lits_gt": [["on", "bread", "shelf"]]}, "bread is no object of the task"),
+        ({"goal_lits_gt": [["on", "bread", "shelf"]]}, "bread is not an object of the task"),
         ({"goal_lits_gt": [["has_water", "coaster"]]}, "'has_water coaster' is none of store_objects"),
         ({"goal_lits_gt": [["clear_on_top", "coaster"]]}, "'clear_on_top coaster' is none of store_objects"),
         ({"comment": "mine"}, "comment: Extra"),

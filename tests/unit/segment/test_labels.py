@@ -203,8 +203,8 @@ def test_words_do_not_contradict_the_vocabulary() -> None:
 
 
 def table_of_labels() -> str:
-    """The table of docs/SEGMENTATION.md: class by class, the labels that stand for it."""
-    rows = ["| class | COCO panoptic | ADE20K | everyday words |", "|---|---|---|---|"]
+    """The table of docs/FORMATS.md: class by class, the labels that stand for it."""
+    rows = ["| class | COCO panoptic | ADE20K | everyday words | PASCAL VOC |", "|---|---|---|---|---|"]
     for name in (*(entry.name for entry in VOCABULARY.classes), ""):
         cells = []
         for source in LABEL_FILES:
@@ -217,5 +217,5 @@ def table_of_labels() -> str:
 
 
 def test_the_table_of_the_documentation_is_current() -> None:
-    text = (LABELS_FOLDER.parents[1] / "docs" / "SEGMENTATION.md").read_text()
-    assert table_of_labels() in text, "put the output of table_of_labels() into docs/SEGMENTATION.md"
+    text = (LABELS_FOLDER.parents[1] / "docs" / "FORMATS.md").read_text()
+    assert table_of_labels() in text, "put the output of table_of_labels() into docs/FORMATS.md"

@@ -129,7 +129,7 @@ def test_ways_to_write_polygons(outline: Any, count: int) -> None:
 @pytest.mark.parametrize(
     ("segmentation", "size", "message"),
     [
-        ([[1, 2, 3, 4, 5]], {}, "mask 1: one of its polygons is no list of numbers in pairs"),
+        ([[1, 2, 3, 4, 5]], {}, "mask 1: one of its polygons is not a list of numbers in pairs"),
         ([[1, 2, 3, 4, "5", 6]], {}, "numbers in pairs"),
         ([[0, 0, 200, 0, 200, 90]], {}, r"reaches to \(200, 90\), the frame has 64x48 pixels"),
         ([[0, 0, 60, 0, 60, 40]], {"width": 128, "height": 96}, "of a picture of 128x96, the frame has 64x48"),

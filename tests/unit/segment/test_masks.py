@@ -283,7 +283,7 @@ TIMES = np.array([10.0, 10.1, 10.2])
 def test_frames_are_found_by_name_number_or_stamp(names: tuple[str, ...], way: str | None) -> None:
     pictures = [Picture(name) for name in names]
     if way is None:  # thirteen digits are milliseconds
-        with pytest.raises(BadInput, match="3 of 3 masks are of frames that are not there"):
+        with pytest.raises(BadInput, match="3 of 3 masks are of frames outside the sequence"):
             match_pictures(pictures, TIMES, 0.02, Path("m"))
         return
     matching = match_pictures(pictures, TIMES, 0.02, Path("m"))
@@ -493,9 +493,9 @@ def test_the_text_is_that_of_pycocotools() -> None:
         ({"size": [4, 5], "counts": "o" * 40 + "0"}, "more than 2.31"),
         ({"size": [4, 5], "counts": "5\x00"}, "letters that none has"),
         ({"size": [5, 4], "counts": [20]}, "4 x 5 pixels, the frame of 5 x 4"),
-        ({"counts": [20]}, "no RLE"),
-        ([[0, 0, 5, 5, 5, 0]], "no RLE"),
-        (None, "no RLE"),
+        ({"counts": [20]}, "not an RLE"),
+        ([[0, 0, 5, 5, 5, 0]], "not an RLE"),
+        (None, "not an RLE"),
     ],
 )
 def test_an_encoding_that_lies_is_refused(encoding: Any, message: str) -> None:
@@ -598,10 +598,10 @@ def test_broken_folders(room: Written, tmp_path: Path, monkeypatch: pytest.Monke
         unlisted: "is not in segments_info",
         lost: "its image '000001.png' is not in",
         torn: "cannot hold",
-        beyond: "1 of 3 masks are of frames that are not there: 000009 (name 9)",
+        beyond: "1 of 3 masks are of frames outside the sequence: 000009 (name 9)",
         bomb: "unpacks to more than",
         pickled: "holds object",
-        colours: "nothing says which class a colour is",
+        colours: "a colour image without a table of its classes",
         text: "holds no masks that are read here",
     }
     for write, message in cases.items():

@@ -228,12 +228,12 @@ def test_a_request_survives_the_wire() -> None:
 # ---- faults --------------------------------------------------------------------------------------------------------
 
 REPLY_FAULTS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
-    "no JSON": (lambda r: b"<html>", "no JSON"),
-    "a list": (lambda r: [r], "no JSON object"),
-    "no UTF-8": (lambda r: b'{"protocol": "\xff"}', "no JSON"),
-    "NaN": (lambda r: json.dumps(r).replace("0.75", "NaN").encode(), "NaN is no number"),
+    "no JSON": (lambda r: b"<html>", "not JSON"),
+    "a list": (lambda r: [r], "not a JSON object"),
+    "no UTF-8": (lambda r: b'{"protocol": "\xff"}', "not JSON"),
+    "NaN": (lambda r: json.dumps(r).replace("0.75", "NaN").encode(), "NaN is not a number"),
     "infinite": (lambda r: json.dumps(r).replace("0.75", "1e999").encode(), "score inf"),
-    "deep": (lambda r: b"[" * 100_000, "no JSON"),
+    "deep": (lambda r: b"[" * 100_000, "not JSON"),
     "another protocol": (lambda r: {**r, "protocol": "scenewright-segmentation/2"}, "speaks 'scenewright-segm"),
     "bad PNG": (lambda r: {**r, "panoptic_png": base64.b64encode(b"\x89PNG\r\n\x1a\n" + b"x" * 50).decode()}, "PNG"),
     "bad base64": (lambda r: {**r, "panoptic_png": "%%%"}, "base64"),
@@ -251,9 +251,9 @@ REPLY_FAULTS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "category text": (lambda r: {**r, "segments_info": [{"id": 5, "category_id": "3"}]}, "category '3'"),
     "score": (lambda r: {**r, "segments_info": [{"id": 5, "category_id": 3, "score": 1.5}]}, "score 1.5"),
     "isthing": (lambda r: {**r, "segments_info": [{"id": 5, "category_id": 3, "isthing": "no"}]}, "isthing"),
-    "no list": (lambda r: {**r, "segments_info": {}}, "no list"),
+    "no list": (lambda r: {**r, "segments_info": {}}, "not a list"),
     "too many": (lambda r: {**r, "segments_info": [{}] * 65537}, "65537 segments"),
-    "no object": (lambda r: {**r, "segments_info": [3]}, "no object"),
+    "no object": (lambda r: {**r, "segments_info": [3]}, "not an object"),
 }
 
 

@@ -154,7 +154,7 @@ def test_bad_requests(room: Written, tmp_path: Path) -> None:
         segment(room.sequence, tmp_path / "a", backend="geometric", corruption=0.1)
     with pytest.raises(MissingDependency, match="weights"):
         segment(room.sequence, tmp_path / "b", backend="detector")
-    with pytest.raises(BadInput, match="no ONNX network"):
+    with pytest.raises(BadInput, match="not an ONNX network"):
         segment(room.sequence, tmp_path / "c", backend="detector", weights=tmp_path / "none.onnx")
     blind = write_sequence(tmp_path / "blind", depth=False, frames=1)
     with pytest.raises(BadInput, match="depth"):

@@ -94,7 +94,7 @@ def detector(weights: Path, tile_side: int = 480) -> Detector:
 
 
 def test_missing_and_broken_weights(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="no ONNX network"):
+    with pytest.raises(BadInput, match="not an ONNX network"):
         detector(tmp_path / "none.onnx")
     for content in (b"", b"no network at all", bytes(range(256)) * 40):
         (tmp_path / "bad.onnx").write_bytes(content)

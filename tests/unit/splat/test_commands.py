@@ -176,7 +176,7 @@ def test_a_path_of_another_log_is_refused(made: tuple[Sequence, Splat], tmp_path
         (lambda data: data[:-4], "torn"),
         (lambda data: b"ply\n" + data, "no PLY"),
         (lambda data: data.replace(b"f_dc_0", b"f_dc_9"), "no PLY"),
-        (lambda data: data[:-4] + np.float32(np.nan).tobytes(), "no number"),
+        (lambda data: data[:-4] + np.float32(np.nan).tobytes(), "not a number"),
         (lambda data: b"", "no PLY"),
     ],
 )

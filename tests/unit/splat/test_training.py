@@ -181,5 +181,5 @@ def test_nothing_to_learn_from_is_said() -> None:
     trainer = Trainer(ours.METHOD, CompiledRasterizer(), np.random.default_rng(0))
     trainer.add_view(broken)
     trainer.gaussians.harmonics[:] = np.nan
-    with pytest.raises(BadInput, match="frame 0: the loss is no number after 0 steps"):
+    with pytest.raises(BadInput, match="frame 0: the loss is not a number after 0 steps"):
         trainer.step()

@@ -26,7 +26,7 @@ VIEW = overhead_camera()
         (np.full((720, 1280), 0.00083), "0.00083"),
         (np.full((720, 1280), 0.70), "no table"),
         (np.zeros((360, 640)), "the depth image is"),
-        (np.full((720, 1280), np.nan), "no numbers"),
+        (np.full((720, 1280), np.nan), "no numbers|not numbers"),
         (None, "no depth image"),
     ],
 )

@@ -116,7 +116,7 @@ def test_damaged_text_is_refused_in_one_line_or_read(data: st.DataObject) -> Non
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (("(lit ?n)", "(lit ?z)"), "'\\?z' is no parameter"),
+        (("(lit ?n)", "(lit ?z)"), "'\\?z' is not a parameter"),
         (("(lit ?n)", "(bright ?n)"), "'bright' is not declared"),
         (("(lit ?n)", "(lit ?n ?l)"), "takes 1 arguments, not 2"),
         (("(lit ?n)", "(forall (?x) (lit ?x))"), "`forall`|list"),

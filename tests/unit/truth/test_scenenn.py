@@ -197,7 +197,7 @@ def test_the_thesis_s_words():
         ('<annotation><label id="one"/></annotation>', "'one'"),
         ('<annotation><label text="chair"/></annotation>', "label 1"),
         ('<annotation><label id="-3"/></annotation>', "-3"),
-        ('<annotation><label id="99999999999999"/></annotation>', "no label of a mesh"),
+        ('<annotation><label id="99999999999999"/></annotation>', "not a label of a mesh"),
         ('<annotation><label id="3"/><label id="3"/></annotation>', "twice"),
         ("", "well-formed"),
     ],

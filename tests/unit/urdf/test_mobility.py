@@ -66,7 +66,8 @@ def graph_with(
     [
         (graph_with("chair"), FREE),
         (graph_with("chair", gap=0.03), FREE),
-        (graph_with("chair", gap=0.3), Mobility(False)),  # it stands on nothing that is known
+        (graph_with("chair", gap=0.3), FREE),  # what it needs to stand is another question
+        (graph_with("chair", gap=-0.1), Mobility(False)),  # it goes through what is said to carry it
         (graph_with("chair", on_top=True), FREE),
         (graph_with("chair", relation="hangs_from"), Mobility(False)),
         (graph_with("cabinet"), Mobility(False)),

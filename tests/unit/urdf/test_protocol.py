@@ -206,7 +206,7 @@ def test_the_page_defines_every_number(tmp_path: Path, judged: Any) -> None:
     root = checkout()
     if root is None:
         pytest.skip("docs are in a checkout")
-    page = (root / "docs" / "PROTOCOL.md").read_text()
+    page = (root / "docs" / "FORMATS.md").read_text().split("\n## A protocol for scenes\n")[1].split("\n## ")[0]
     found = judged(urdf(tmp_path / "scene.urdf", [TABLE, cup(0.77), FRAME, DOOR]), code=4)
     names = set(found) | set(found["yield"]) | set(found["engines"]["bullet"]) | set(found["limits"])
     names |= set(found["pairs"][0]) | set(found["sweeps"][0]) | set(found["free_bodies"][0]["bullet"])

@@ -11,6 +11,7 @@ from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, Grap
 from scenewright.schemas.scene_parts import Box, Relation, SurfacePlane
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
+from scenewright.stages.kit.formats.scene_links import INFERRED
 from scenewright.stages.kit.formats.scene_supports import Carried, cut_below, levelled, standing_points
 from scenewright.stages.kit.formats.urdf_check import check_urdf
 from scenewright.stages.kit.formats.urdf_file import parse_urdf
@@ -122,6 +123,19 @@ def test_a_reconstructed_thing_stays_on_a_reconstructed_table(tmp_path: Path) ->
     bare = graph.model_copy(update={"links": tuple(link.model_copy(update={"plane": None}) for link in graph.links)})
     write_scene_bundle(tmp_path / "without", bodies, bare)
     assert not settle_report(tmp_path / "without", 1.0).settled  # which is why the plane is needed
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_a_top_that_nobody_saw_is_drawn_as_inferred(tmp_path: Path, hidden: bool) -> None:
+    bodies, graph = uneven_scene()
+    nodes = tuple(
+        node.model_copy(update={"planes": tuple(p.model_copy(update={"hidden": hidden}) for p in node.planes)})
+        for node in graph.nodes
+    )
+    write_scene_bundle(tmp_path, bodies, graph.model_copy(update={"nodes": nodes}))
+    link = parse_urdf(tmp_path / "scene.urdf").link("table_2")
+    drawn = [shape.box_size for shape in link.visuals if shape.color == pytest.approx(INFERRED)]
+    assert drawn == ([pytest.approx((0.1, 0.1, 0.02))] if hidden else []), "the pad under the ball"
 
 
 def test_mass_and_friction_follow_the_class(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def test_what_has_no_name_is_a_static_body(cad_scene, tmp_path):
     joint = next(joint for joint in parse_urdf(made.path("static.urdf")).joints if joint.child == "surroundings")
     assert (joint.parent, joint.type) == ("world", "fixed")
     assert np.array(body.box.center) == pytest.approx([-1.15, 1.2, 0.45])
-    assert made.graph == cad_scene.graph, "it is no node"
+    assert made.graph == cad_scene.graph, "it is not a node"
 
 
 def test_what_hangs_in_the_air_is_named(cad_scene, tmp_path, caplog):

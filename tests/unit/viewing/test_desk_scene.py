@@ -111,8 +111,8 @@ def test_what_is_none_is_refused(room: dict[str, Path], tmp_path: Path) -> None:
         for edit, words in (
             ({"what": "joint", "of": "fridge_3", "at": "</script>"}, "no joint"),
             ({"what": "joint", "of": "cabinet_5", "at": "door"}, "no model"),
-            ({"what": "move", "of": "table_2", "to": [0, "a", 0]}, "no place"),
-            ({"what": "move", "of": "table_2", "to": [0, 0, 0], "turn_degrees": "x"}, "no number"),
+            ({"what": "move", "of": "table_2", "to": [0, "a", 0]}, "not a place"),
+            ({"what": "move", "of": "table_2", "to": [0, 0, 0], "turn_degrees": "x"}, "not a number"),
             ({"what": "move", "of": "unicorn_1"}, "no thing"),
             ({"what": "model", "of": "table_2", "model": "../../etc"}, "model"),
             ({"what": "support", "of": "box_4", "on": {"class": "cup"}}, "no thing"),

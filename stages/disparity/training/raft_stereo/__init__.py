@@ -1,4 +1,4 @@
-"""The small RAFT-Stereo, trained on rendered pairs and random shapes (docs/DISPARITY.md)."""
+"""The small RAFT-Stereo, trained on rendered pairs and random shapes (docs/MAPPING.md)."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def stems(folder: Path, *kinds: str) -> list[Path]:
     """Return the stems of the kept pairs of these kinds in their order. Raises BadInput where there is none."""
     found = [file for kind in kinds for file in sorted(folder.glob(f"{kind}_*_left.png"))]
     if not found:
-        raise BadInput(f"{folder}: no kept pairs of {' or '.join(kinds)}", hint="render them first: docs/DISPARITY.md")
+        raise BadInput(f"{folder}: no kept pairs of {' or '.join(kinds)}", hint="render them first: docs/MAPPING.md")
     return [file.with_name(file.name.removesuffix("_left.png")) for file in found]
 
 

@@ -2,7 +2,7 @@
 
     scenewright train raft-stereo --pairs FOLDER --out FOLDER [--quick] [--steps N] [--seed N]
 
-A step sees random shapes (made on the fly), crops of rooms and of the needle world (docs/DISPARITY.md says how they are
+A step sees random shapes (made on the fly), crops of rooms and of the needle world (docs/MAPPING.md says how they are
 rendered). Its samples depend on the seed and the step's number alone, and the state is written every few minutes: a run
 that was stopped ends with the bytes of one that was not, on the same machine. The result is
 `raft_stereo_small.safetensors`, the moving average of the weights.

@@ -119,7 +119,7 @@ class _Reader:
         try:
             return window[:end].decode("utf-8")
         except UnicodeDecodeError:
-            raise BadInput(f"{self.path}: byte {self.place}: a name is no UTF-8") from None
+            raise BadInput(f"{self.path}: byte {self.place}: a name is not UTF-8") from None
 
     def skip(self, count: int) -> None:
         self._check(count)

@@ -189,7 +189,7 @@ def _frames(document: dict[str, Any], file: Path) -> list[_Frame]:
     for index, fields in enumerate(document["frames"]):
         where = f"{file}: frame {index}"
         if not isinstance(fields, dict):
-            raise BadInput(f"{where}: is no object")
+            raise BadInput(f"{where}: is not an object")
         depth = fields.get("depth_file_path")
         if depth is None and (root / str(fields.get("depth_path"))).is_file():  # NeRFCapture names files it never wrote
             depth = fields["depth_path"]
@@ -232,7 +232,7 @@ def _pose(value: Any) -> tuple[np.ndarray | None, str | None]:
 def _number(fields: dict[str, Any], name: str, where: str, default: float | None = None, largest: float = 1e9) -> float:
     value = fields.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= largest:
-        raise BadInput(f"{where}: {name} = {value!r:.40} is no number")
+        raise BadInput(f"{where}: {name} = {value!r:.40} is not a number")
     return float(value)
 
 
@@ -334,7 +334,7 @@ def _world_from_saved(
         matrix, problem = _pose(document["applied_transform"])
         if matrix is None or not is_rigid(matrix, 1e-2):
             raise BadInput(
-                f"{file}: applied_transform is no rigid transform", hint=problem or "3x4, rotation and shift"
+                f"{file}: applied_transform is not a rigid transform", hint=problem or "3x4, rotation and shift"
             )
         applied = matrix
     original_from_saved = inverse(applied)

@@ -62,7 +62,7 @@ class Metadata:
 def read_metadata(document: Any, where: str) -> Metadata:
     """Return what a document says. Raises BadInput, beginning with `where`, for one of another kind."""
     if not isinstance(document, dict):
-        raise BadInput(f"{where}: is no object with K and poses")
+        raise BadInput(f"{where}: is not an object with K and poses")
     matrix = _rows(document, "K", 9, where, whole=True)[0]
     columns = matrix if matrix[6] or matrix[7] else tuple(np.reshape(matrix, (3, 3)).T.reshape(9).tolist())
     rate = document.get("fps")
@@ -88,7 +88,7 @@ def _rows(document: dict[str, Any], key: str, width: int, where: str, *, whole: 
     try:
         numbers = [tuple(float(number) for number in row) for row in rows]
     except (TypeError, ValueError, OverflowError):
-        raise BadInput(f"{where}: {key} holds what is no number") from None
+        raise BadInput(f"{where}: {key} holds a value that is not a number") from None
     wrong = next((k for k, row in enumerate(numbers) if len(row) != width), None)
     if wrong is not None:
         place = "" if whole else f", frame {wrong}"

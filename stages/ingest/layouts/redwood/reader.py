@@ -53,7 +53,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     if colors and len(colors) != len(depths):
         raise BadInput(
             f"{root}: {len(colors)} colour and {len(depths)} depth images are not pairs",
-            hint="the format pairs them by order, so one missing image would shift all that follow",
+            hint="the format pairs images by order: add the missing ones, or delete their partners",
         )
     if len(poses) > len(depths):
         raise BadInput(f"{root / TRAJECTORY}: {len(poses)} poses for {len(depths)} images")

@@ -72,9 +72,9 @@ def read_camera_matrix(path: Path) -> tuple[float, float, float, float]:
     try:
         numbers = [float(field) for field in read_text(path).replace(",", " ").split()]
     except ValueError:
-        raise BadInput(f"{path}: holds what is no number") from None
+        raise BadInput(f"{path}: holds a value that is not a number") from None
     if len(numbers) != 9 or numbers[6:] != [0, 0, 1]:
-        raise BadInput(f"{path}: is no 3x3 camera matrix", hint="three lines of three numbers, the last 0, 0, 1")
+        raise BadInput(f"{path}: is not a 3x3 camera matrix", hint="three lines of three numbers, the last 0, 0, 1")
     return numbers[0], numbers[4], numbers[2], numbers[5]
 
 

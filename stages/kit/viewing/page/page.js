@@ -311,11 +311,17 @@
       list.append(row);
     }
   }
+  function explain(name) {
+    const found = Object.entries(shown.because || {}).find(([one]) => name && same(one, name));
+    element("why").hidden = !found;
+    element("because").replaceChildren(...(found ? found[1] : []).map((line) => made("li", line)));
+  }
   function choose(name, come) {
     state.chosen = name;
     for (const button of document.querySelectorAll(".node .name")) button.classList.toggle("chosen", button.textContent === name);
     const box = markNode(name);
     tell(name ? relationsOf(name) : []);
+    explain(name);
     if (box && come) {
       state.target = [0, 1, 2].map((k) => box.corners.reduce((sum, corner) => sum + corner[k], 0) / 8);
       state.eye[2] = Math.max(Math.min(0.6, extent), 3 * Math.hypot(...[0, 1, 2].map((k) => box.corners[7][k] - box.corners[0][k])));

@@ -80,6 +80,7 @@ class PageCanvas:
         }
         self._graph: dict[str, Any] | None = None
         self._trust: dict[str, dict[str, Any]] = {}
+        self._because: dict[str, list[str]] = {}
         self._left_out: set[str] = set()
         self._pyramids: set[str] = set()
 
@@ -216,6 +217,10 @@ class PageCanvas:
             color = bytes_of(trust_color(trust.share))
             self._trust[name] = {"share": round(trust.share, 3), "reasons": reasons, "color": color}
 
+    def explain(self, rows: Mapping[str, Sequence[str]]) -> None:
+        """Say why things are what they are, by name: a click on one shows its sentences."""
+        self._because = {cleaned(name): [cleaned(line) for line in lines] for name, lines in rows.items()}
+
     def moment(self, seconds: float, text: str, *, bad: bool = False) -> None:
         """See Canvas."""
         self._entries["moments"].append({"time": float(seconds), "text": cleaned(text), "bad": bad})
@@ -273,6 +278,7 @@ class PageCanvas:
             "pictures": self._kept_pictures(),
             "graph": self._graph,
             "trust": self._trust,
+            "because": self._because,
             "left_out": sorted(self._left_out),
             **self._entries,
         }

@@ -86,6 +86,9 @@ def _replacement_row(replacement: Replacement) -> dict[str, str]:
     decision = chosen.model_id if chosen is not None and replacement.decision == "cad" else replacement.decision
     if replacement.reason:
         decision += f" ({replacement.reason})"
+    if replacement.inferred is not None:
+        inferred = replacement.inferred
+        decision += f"; inferred: {inferred.what or 'nothing'}, {inferred.because}"
     return {
         "node": replacement.node,
         "what": decision,

@@ -92,7 +92,7 @@ class Detector:
         try:
             self._network = cv2.dnn.readNetFromONNX(str(weights))
         except (cv2.error, MemoryError) as error:
-            raise BadInput(f"{weights.name} is no ONNX network that OpenCV can read", hint=hint) from error
+            raise BadInput(f"{weights.name} is not an ONNX network that OpenCV can read", hint=hint) from error
         self.size = self._find_size()
         if not self.size:
             raise BadInput(f"{weights.name} does not have the inputs and outputs of YOLOX (COCO-80)", hint=hint)

@@ -43,7 +43,7 @@ def read_classes(listing: Listing) -> tuple[dict[int, Category], int]:
     if isinstance(data, dict) and "classes" in data:
         divisor = entry(data, "divisor", int) or 0
         if not 0 <= divisor <= LARGEST_NUMBER:
-            raise BadInput(f"{path}: divisor {divisor} is no number of 0 or more", hint=HINT)
+            raise BadInput(f"{path}: divisor {divisor} is not a number of 0 or more", hint=HINT)
         data = data["classes"]
     return categories_of(data, where), divisor
 

@@ -43,7 +43,7 @@ def read_instances(path: Path, shape: tuple[int, int]) -> tuple[np.ndarray, bool
         image = image[..., 0]  # grey, stored as colour
     if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
         raise BadInput(
-            f"{path}: is a picture of colours, and nothing says which class a colour is",
+            f"{path}: is a colour image without a table of its classes",
             hint="put a labelmap.txt beside it (a line `chair:128,0,0` for each class), COCO's JSON where it is a "
             "panoptic PNG, or write one channel whose values are the instances",
         )
@@ -103,6 +103,6 @@ def _checked_content(path: Path, shape: tuple[int, int]) -> bytes:
 def decode_mask(data: bytes, where: str) -> np.ndarray:
     """Return the mask (h, w) bool of a small PNG: where it is not 0. Raises BadInput, beginning with `where`."""
     if not may_be_decoded(data):
-        raise BadInput(f"{where}: its mask is no sound PNG", hint="write it again")
+        raise BadInput(f"{where}: its mask is not a sound PNG", hint="write it again")
     image = _decoded(Path(where), data)
     return (image if image.ndim == 2 else image.max(axis=2)) != 0

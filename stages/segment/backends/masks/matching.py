@@ -127,7 +127,7 @@ def _placed(
     if astray:
         astray_text = ", ".join(astray[:SHOWN]) + (", ..." if len(astray) > SHOWN else "")
         raise BadInput(
-            f"{where}: {len(astray)} of {len(pictures)} masks are of frames that are not there: {astray_text}",
+            f"{where}: {len(astray)} of {len(pictures)} masks are of frames outside the sequence: {astray_text}",
             hint=f"the sequence has frames 0 to {len(times) - 1} from {times.min():.6f} to {times.max():.6f} s; "
             "name masks by these numbers or times, or as the log names its pictures"
             if len(times)

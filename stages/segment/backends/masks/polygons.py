@@ -21,7 +21,7 @@ def polygons_of(outline: Any) -> list[np.ndarray]:
     Raises BadInput, in words that follow the name of the mask, when it is no list of numbers in pairs.
     """
     if not isinstance(outline, list):
-        raise BadInput("its outline is no list of polygons", hint="[[x1, y1, x2, y2, x3, y3, ...], ...]")
+        raise BadInput("its outline is not a list of polygons", hint="[[x1, y1, x2, y2, x3, y3, ...], ...]")
     if outline and all(_is_number(value) for value in outline):
         outline = [outline]
     if len(outline) > 2 and all(isinstance(part, list) and len(part) == 2 for part in outline):
@@ -30,7 +30,7 @@ def polygons_of(outline: Any) -> list[np.ndarray]:
     for part in outline:
         if not isinstance(part, list) or len(part) % 2 or not all(_is_number(value) for value in part):
             raise BadInput(
-                "one of its polygons is no list of numbers in pairs", hint="[[x1, y1, x2, y2, x3, y3, ...], ...]"
+                "one of its polygons is not a list of numbers in pairs", hint="[[x1, y1, x2, y2, x3, y3, ...], ...]"
             )
         if len(part) >= 6:
             polygons.append(np.array(part, dtype=np.float64).reshape(-1, 2))

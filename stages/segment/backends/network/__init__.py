@@ -1,4 +1,4 @@
-"""Backend `network`: our own RGB-D panoptic network, trained on generated rooms (docs/NETWORK.md)."""
+"""Backend `network`: our own RGB-D panoptic network, trained on generated rooms (docs/SEGMENTATION.md)."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def open_backend(request: BackendRequest) -> NetworkBackend:
     """Return the backend that the request asks for. Raises UsageError for weights of another kind, BadInput."""
     if request.weights is not None and request.weights.suffix != ".safetensors":
         raise UsageError(
-            f"{request.weights.name} is no checkpoint of the network of our own (a .safetensors file)",
+            f"{request.weights.name} is not a checkpoint of the network of our own (a .safetensors file)",
             hint="say whose weights they are with --backend detector, onnx or huggingface",
         )
     sequence = request.sequence.info if request.sequence is not None else None

@@ -15,7 +15,9 @@ class ObjectsParameters(Parameters):
     grouping: Literal["learned", "rules"] = Field(
         "learned", description="What tells --backend objects which patches are one object: trained trees, or set rules"
     )
-    largest_object: float = Field(0.6, gt=0, description="What is larger across is no object for --backend objects [m]")
+    largest_object: float = Field(
+        0.6, gt=0, description="What is larger across is not an object for --backend objects [m]"
+    )
 
 
 def _trees(parameters: ObjectsParameters) -> tuple[str, ...]:

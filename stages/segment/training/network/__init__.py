@@ -1,4 +1,4 @@
-"""The network of `segment --backend network`, trained on stored frames (docs/NETWORK.md)."""
+"""The network of `segment --backend network`, trained on stored frames (docs/SEGMENTATION.md)."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class FrameSet:
         self._places: list[tuple[int, int]] = []
         self.grow()
         if not self._places:
-            raise BadInput(f"{folder}: no frames", hint="make them first (docs/NETWORK.md)")
+            raise BadInput(f"{folder}: no frames", hint="make them first (docs/SEGMENTATION.md)")
 
     def grow(self) -> None:
         """Take the shards that were written since."""

@@ -3,7 +3,7 @@
 The thesis contradicts itself: the handover section retries when the needle's orientation is unchanged, the recovery
 section when its change is nonzero. Jaws that close on a needle that another driver holds, and then move, turn it; jaws
 that miss do not. So an unchanged normal is the sign of a miss, and that is the test used. With the other reading most
-trials end in handover (measured: docs/STITCH_TRIALS.md).
+trials end in handover (measured: docs/STITCH.md).
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def test_given_weights_are_used_and_named(room: Written, tmp_path: Path) -> None
 
 
 def test_weights_of_another_backend_are_refused(room: Written, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no checkpoint of the network of our own"):
+    with pytest.raises(UsageError, match="not a checkpoint of the network of our own"):
         segment(room.sequence, tmp_path / "a", backend="network", weights=tmp_path / "yolox.onnx")
     (tmp_path / "torn.safetensors").write_bytes(b"123")
     with pytest.raises(BadInput, match=r"torn\.safetensors"):

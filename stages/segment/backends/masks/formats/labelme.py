@@ -86,7 +86,7 @@ def _area(row: Any, points: np.ndarray, where: str) -> list[np.ndarray] | Crop |
         try:
             data = base64.b64decode(row.get("mask") or "", validate=True)
         except (binascii.Error, ValueError, TypeError):
-            raise BadInput(f"{where}: its mask is no base64", hint=HINT) from None
+            raise BadInput(f"{where}: its mask is not base64", hint=HINT) from None
         return Crop(decode_mask(data, where), int(round(left)), int(round(top)))
     raise BadInput(f"{where}: a shape of the unknown kind {kind!r:.30}", hint="draw it as a polygon")
 

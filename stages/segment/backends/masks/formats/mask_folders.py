@@ -103,7 +103,7 @@ def _scores(table: Path) -> dict[str, float]:
         try:
             scores[row[columns[0]]] = min(1.0, *(float(row[column]) for column in columns[1:]))
         except (ValueError, IndexError):
-            raise BadInput(f"{table}: {','.join(row)!r:.60} is no row of numbers", hint="write it again") from None
+            raise BadInput(f"{table}: {','.join(row)!r:.60} is not a row of numbers", hint="write it again") from None
     return {name: score if score >= 0 else 0.0 for name, score in scores.items()}
 
 

@@ -54,7 +54,7 @@ def _is_sam(row: Any) -> bool:
 def _score(row: dict[str, Any], where: str) -> float:
     scores = [row[key] for key in ("predicted_iou", "stability_score") if row.get(key) is not None]
     if not all(isinstance(value, int | float) and not isinstance(value, bool) and value >= 0 for value in scores):
-        raise BadInput(f"{where}: predicted_iou or stability_score is no number of 0 or more", hint=HINT)
+        raise BadInput(f"{where}: predicted_iou or stability_score is not a number of 0 or more", hint=HINT)
     # The network's judgement of its own mask may pass 1 a little.
     return float(min([1.0, *scores]))
 

@@ -79,7 +79,7 @@ def _is_label(path: Path) -> bool:
 def _row(line: str, path: Path) -> tuple[int, np.ndarray | None, float]:
     """Return class, polygon (K, 2) in shares of the picture (None: a box), and score."""
     if not _is_row(line):
-        raise BadInput(f"{path}: {line!r:.60} is no row of numbers", hint=HINT)
+        raise BadInput(f"{path}: {line!r:.60} is not a row of numbers", hint=HINT)
     words = line.split()
     values = np.array([float(word) for word in words[1:]])
     score = float(values[-1]) if len(values) % 2 else 1.0
