@@ -11,7 +11,8 @@ from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.errors import BadInput
 from scenewright.stages.engine.chain import run_command
 from scenewright.stages.engine.discovery import package_of, stage_by_name
-from scenewright.stages.engine.reading import open_artifact
+from scenewright.stages.engine.migration import migrate
+from scenewright.stages.engine.reading import open_artifact, read_manifest
 from scenewright.stages.engine.runner import run_stage
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context, Parameters
@@ -68,7 +69,13 @@ def unrecorded(
 
 
 def opened(kind: type[Kind], path: Path) -> Kind:
-    """Return the artifact at `path`. Raises BadInput when it is missing, broken or of another kind."""
+    """Return the artifact at `path`, one of an older schema version migrated beside it: other versions of the program
+    are measured too. Raises BadInput when it is missing, broken or of another kind."""
+    manifest = read_manifest(path)
+    if manifest.kind == kind.kind and manifest.schema_version < kind.schema_version:
+        older, path = path, path.with_name(f"{path.name}-v{kind.schema_version}")
+        if not path.is_dir():
+            migrate(older, path)
     artifact = open_artifact(path, kind)
     assert isinstance(artifact, kind)
     return artifact
