@@ -80,7 +80,7 @@ def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, A
     return {
         "experiment": "board",
         "title": "The board: figures that versions can be compared by",
-        "date": max(line.day for line in lines),
+        "date": min(line.day for line in lines),
         "commit": newest.commit,
         "machine": MACHINE,
         "command": "make board",
