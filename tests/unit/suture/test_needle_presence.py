@@ -66,7 +66,7 @@ def test_clutter_stands_at_one_place_for_both_eyes() -> None:
     ]
     assert len(changed[0]) > 0 and abs(changed[0][0] - changed[1][0]) <= 1 and abs(changed[0][-1] - changed[1][-1]) <= 1
     np.testing.assert_array_equal(messy.left.bodies, plain.left.bodies)
-    with pytest.raises(ValueError, match="pictures"):
+    with pytest.raises(ValueError, match="images"):
         cluttered(render(scene, pictures=False), np.random.default_rng(1))
 
 
@@ -88,5 +88,5 @@ def test_drapes_lie_before_the_pad_in_both_eyes_and_are_the_same_each_time() -> 
     moved = np.abs(left[:, shift:] - right[:, :-shift]).mean()
     assert moved < np.abs(left - right).mean(), "what lies near the pad is as far to the left in the right eye"
     np.testing.assert_array_equal(views[0].left.bodies, plain.left.bodies)
-    with pytest.raises(ValueError, match="pictures"):
+    with pytest.raises(ValueError, match="images"):
         draped(flat_view(pictures=False), np.random.default_rng(1))

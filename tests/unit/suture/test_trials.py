@@ -284,8 +284,9 @@ def test_ends_and_normal_give_the_pose() -> None:
 def test_a_file_that_is_no_perception_model(tmp_path: Path, text: str) -> None:
     path = tmp_path / "model.toml"
     path.write_text(text)
-    with pytest.raises(BadInput, match="no perception model"):
+    with pytest.raises(BadInput, match=r"model\.toml: (no perception model|Invalid)") as caught:
         perception_model(path)
+    assert "perception_thesis.toml" in str(caught.value.hint)
 
 
 @pytest.mark.parametrize(("arm", "length"), [("thesis", 0.30), ("ours", 0.30), ("ours", 0.22), ("ours", 0.40)])
