@@ -1,7 +1,7 @@
 """`python -m benchmarks.board.checking`: one published trial, drawn by the commit, measured again and compared.
 
 Drawn among the cheapest rung of the public rooms, of the newest version, and measured in a worktree of its commit, by
-the judge of board 1: where the code that judges has changed since, in a worktree of JUDGE.
+its judge: where the code that judges has changed since, in a worktree of the commit that judged it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from benchmarks.board.records import Line, judge_digest, read_lines
 
 CHEAPEST = "perfect"
 DIFFERS = 4
-JUDGE = "1cb0dbff"
-"""The commit whose code judged the public, sealed and task records of board 1."""
 ONE_TRIAL = """
 import sys
 from pathlib import Path
@@ -62,7 +60,7 @@ def differing(one: Line, other: Line) -> list[str]:
 
 def measured_again(line: Line, out: Path) -> Line:
     """Measure a public trial again below `out`, by the code that judged it. Raises ScenewrightError."""
-    judge = REPOSITORY if line.judge == judge_digest() else checkout_of(JUDGE, out / "checkouts")
+    judge = REPOSITORY if line.judge == judge_digest() else checkout_of(line.board, out / "checkouts")
     written = out / "again.jsonl"
     written.parent.mkdir(parents=True, exist_ok=True)
     written.unlink(missing_ok=True)
@@ -88,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(f"{commits_since(line.commit)} commits changed the method since {line.commit}, whose figures are published")
         again = measured_again(line, asked.out.resolve())
         if again.judge != line.judge:
-            say(f"{line.trial}: judged by {line.judge}, {JUDGE} judges by {again.judge}: nothing to compare")
+            say(f"{line.trial}: judged by {line.judge}, {line.board} judges by {again.judge}: nothing to compare")
             return 0
     except UsageError as error:  # a clone without history cannot be asked
         say(f"nothing compared: {error}")
