@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.geometry.convex_pieces import hull_volume
 from scipy.spatial import ConvexHull, QhullError
 
 THINNEST = 0.004
@@ -51,9 +52,4 @@ def _corners(points: np.ndarray) -> np.ndarray:
 
 def _volume(points: np.ndarray) -> float:
     """Volume [m^3] of the hull, 0 for what is thinner than THINNEST along an axis."""
-    if len(points) < 4 or np.ptp(points, axis=0).min() < THINNEST:
-        return 0.0
-    try:
-        return float(ConvexHull(points).volume)
-    except (QhullError, ValueError):
-        return 0.0
+    return hull_volume(points) if len(points) >= 4 and np.ptp(points, axis=0).min() >= THINNEST else 0.0

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.stages.kit.formats.scene_bundle import BundleBody
+from scenewright.stages.kit.geometry.convex_pieces import hull_volume
 from scenewright.stages.urdf.giving_way import CLEARANCE, Piece, with_pieces, written_pieces
 from scipy.spatial import ConvexHull, QhullError
 
@@ -47,7 +48,7 @@ def merged(pieces: Sequence[Piece], others: Sequence[Piece], most: int) -> list[
     """Return at most `most` convex pieces whose hulls hold those given, more where fewer would come nearer to one of
     `others` than 3 mm, or deeper into it than what they hold."""
     left = {number: _corners(piece) for number, piece in enumerate(pieces)}
-    volume = {number: _volume(piece.points) for number, piece in left.items()}
+    volume = {number: hull_volume(piece.points) for number, piece in left.items()}
     depth: dict[int, float] = {}
     low, high = (np.array([getattr(piece, side) for piece in others]).reshape(-1, 3) for side in ("low", "high"))
 
@@ -57,7 +58,7 @@ def merged(pieces: Sequence[Piece], others: Sequence[Piece], most: int) -> list[
         return max((grown.depth(others[int(k)]) for k in near), default=0.0)
 
     def offer(first: int, second: int) -> tuple[float, int, int]:
-        both = _volume(np.concatenate([left[first].points, left[second].points]))
+        both = hull_volume(np.concatenate([left[first].points, left[second].points]))
         return both - volume[first] - volume[second], first, second
 
     beside = _neighbours(list(left.values()))
@@ -76,7 +77,7 @@ def merged(pieces: Sequence[Piece], others: Sequence[Piece], most: int) -> list[
             if reached > max(depth[first], depth[second]) + ROUNDING:
                 continue
         del left[first], left[second]
-        left[following], volume[following], depth[following] = one, _volume(one.points), reached
+        left[following], volume[following], depth[following] = one, hull_volume(one.points), reached
         beside[following] = {number for number in beside[first] | beside[second] if number in left}
         for number in sorted(beside[following]):
             beside[number].add(following)
@@ -102,11 +103,3 @@ def _corners(piece: Piece) -> Piece:
         return Piece(piece.points[np.sort(ConvexHull(piece.points).vertices)])
     except (QhullError, ValueError):  # flat
         return piece
-
-
-def _volume(points: np.ndarray) -> float:
-    """Volume of the hull [m^3]."""
-    try:
-        return float(ConvexHull(points).volume)
-    except (QhullError, ValueError):  # flat
-        return 0.0

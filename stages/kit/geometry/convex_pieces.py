@@ -45,7 +45,7 @@ def _best_cut(corners: np.ndarray) -> tuple[float, np.ndarray] | None:
     if len(corners) < 2 * LEAST_TRIANGLES:
         return None
     sample = corners[:: max(1, len(corners) // MOST_TRIANGLES)]
-    volume = _hull_volume(sample)
+    volume = hull_volume(sample)
     best: tuple[float, np.ndarray] | None = None
     for axis in _axes(sample):
         along, along_few = corners.mean(axis=1) @ axis, sample.mean(axis=1) @ axis
@@ -55,7 +55,7 @@ def _best_cut(corners: np.ndarray) -> tuple[float, np.ndarray] | None:
             side = along_few < limit
             if min(side.sum(), (~side).sum()) < LEAST_TRIANGLES:
                 continue
-            saved = volume - _hull_volume(sample[side]) - _hull_volume(sample[~side])
+            saved = volume - hull_volume(sample[side]) - hull_volume(sample[~side])
             if saved > GAIN * volume and (best is None or saved > best[0]):
                 best = (saved, along < limit)
     return best
@@ -69,7 +69,8 @@ def _axes(corners: np.ndarray) -> np.ndarray:
     return np.array([[0.0, 0.0, 1.0], [*turned[:, 0], 0.0], [*turned[:, 1], 0.0]])
 
 
-def _hull_volume(corners: np.ndarray) -> float:
+def hull_volume(corners: np.ndarray) -> float:
+    """Return the volume [m^3] of the convex hull of points (..., 3) [m]; 0 where they are flat."""
     try:
         return float(ConvexHull(corners.reshape(-1, 3)).volume)
     except (QhullError, ValueError):
