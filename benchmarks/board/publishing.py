@@ -80,7 +80,8 @@ def published(versions: Sequence[Version], looks: Sequence[Look]) -> dict[str, A
     return {
         "experiment": "board",
         "title": "The board: figures that versions can be compared by",
-        "date": min(line.day for line in lines),
+        "date": max(line.day for line in lines),
+        "days": {part: max(line.day for line in lines if line.trial.part == part) for part in sorted(commits)},
         "commit": newest.commit,
         "machine": MACHINE,
         "command": "make board",

@@ -43,6 +43,11 @@ class Experiment:
             raise FiguresError(f"{self.name}.json has no figure {key!r}")
         return self.figures[key]
 
+    def day(self, key: str) -> str:
+        """When a figure was measured: where parts of an experiment have days of their own, that of its part."""
+        part = key.split("/")[1].split(" ")[0]
+        return str(self.about.get("days", {}).get(part, self.about["date"]))
+
     def shown(self, part: str) -> str:
         """The words for an arm, a case or a measure."""
         return str(self.about.get("names", {}).get(part, part.replace("_", " ")))

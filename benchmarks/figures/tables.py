@@ -203,10 +203,9 @@ def headlines(experiments: Mapping[str, Experiment], spec: Mapping[str, Any], pa
         cases = f"{figure.cases} {experiment.about.get('a_case', 'cases')}" if figure.cases else "–"
         about_it = "″" if name == above else f"{clause_of(experiment, 'simulated')}; {clause_of(experiment, 'knows')}"
         above = name
-        date = str(experiment.about["date"])
         told = said.get("simulated", about_it)
         rival = "; ".join(rivals) or said.get("rival", "–")
-        rows.append([linked + unit, cell(figure, digits, brief), rival, cases, told, date])
+        rows.append([linked + unit, cell(figure, digits, brief), rival, cases, told, experiment.day(ours)])
     what = "simulated" if brief else "what was simulated; what the method may know"
     header = ["figure", "ours", "beside it", "cases", what, "measured"]
     return markdown_table(header, rows, len(header))

@@ -42,7 +42,7 @@ LEAST_EDGE = 0.5
 NEAR = 0.03
 """Largest distance from a surface that faces its way at which surface is explained [m]."""
 EXPLAINED = 0.75
-"""Share of what was seen that a built-in explains."""
+"""Share of what was seen that a built-in, or a form of a family, explains."""
 LEVEL_KEPT, SAME_LEVEL = 0.9, 0.02
 """Share of what was seen and looks up that lies so near [m] to surface of a built-in that does."""
 MOST_FILLED, DEEP = 0.1, 0.05

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.stages.cad.built_ins import EXPLAINED
 from scenewright.stages.cad.carcasses import Patches, patches_of
 from scenewright.stages.cad.explained import NEAR
 from scenewright.stages.cad.families import chairs, shelves, sofas, tables
@@ -24,8 +25,6 @@ FAMILIES: Mapping[str, tuple[tuple[str, ...], Callable[[Reading], Form | str]]] 
     "table": (("table", "desk", "bench", "stool"), tables.read),
 }
 """Family -> classes whose things may be of it, and what reads it off a surface."""
-EXPLAINED = 0.75
-"""Share of what was seen that a form explains, as of what is built in."""
 FEWEST = 50
 """Patches of surface without which nothing can be said."""
 INDEPENDENT = 0.1
