@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scenewright.stages.cad.carcasses import Patches
 from scenewright.stages.cad.families.forms import Form, Piece, Reading
-from scenewright.stages.cad.families.reading import board_at, bounds, corner_legs, in_own_frame, levels, posts_below
+from scenewright.stages.cad.families.reading import (
+    ASIDE,
+    board_at,
+    bounds,
+    corner_legs,
+    in_own_frame,
+    levels,
+    posts_below,
+)
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 SEAT_LOW, SEAT_HIGH, LEAST_SEAT = 0.3, 0.65, 0.06
@@ -50,7 +60,17 @@ def read(reading: Reading) -> Form | str:
     legs = posts_below(seat, own) or corner_legs(seat, own, LEG)
     if not legs:
         return "nothing carries its seat"
+    if not _in_pairs(legs, seat):
+        return "a leg has no partner on the other side, so that part of its seat is hidden"
     return Form("chair", ("chair",), (seat, *back, *legs), own.turn)
+
+
+def _in_pairs(legs: Sequence[Piece], seat: Piece) -> bool:
+    """Whether legs stand on both sides of the middle of a seat, or in it: a chair is the same from left and right."""
+    middle = 0.5 * (seat.corners[:, 0].min() + seat.corners[:, 0].max())
+    half = seat.corners[:, 0].max() - middle
+    off = np.array([0.5 * (leg.corners[:, 0].min() + leg.corners[:, 0].max()) - middle for leg in legs])
+    return np.count_nonzero(off > ASIDE * half) == np.count_nonzero(off < -ASIDE * half)
 
 
 def _back_behind(reading: Reading, seat: float) -> Reading:

@@ -141,6 +141,14 @@ def test_a_chair_has_a_seat_a_back_and_legs():
     assert back[:, 1].min() > seat.corners[:, 1].mean(), "behind the seat, along +y"
 
 
+def test_a_chair_whose_seat_is_half_hidden_is_refused():
+    """What is left of it under a table: a leg whose partner would stand where cameras saw that nothing is."""
+    boxes = chair()
+    half = [((-0.22, -0.2, 0.42), (0.02, 0.2, 0.45)), *boxes[1:7], *boxes[8:]]
+    found = fit("chair", reading_of(half))
+    assert isinstance(found, str) and "has no partner" in found
+
+
 def test_a_shelf_has_its_boards_and_sides():
     form = fitted("shelf", reading_of(shelf()))
     tops = sorted(piece.corners[:, 2].max() for piece in named(form, "board"))
