@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,17 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(os.geteuid() != 0 or shutil.which("debootstrap") is None, reason="needs root and debootstrap"),
 ]
+GIGABYTES = 7  # What a root with its environment, and pip's own copies while it installs, take.
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """Yield a folder for a root, which goes when the test ends: pytest would keep gigabytes of each."""
+    free = shutil.disk_usage(tmp_path).free / 1e9
+    if free < GIGABYTES:
+        pytest.skip(f"{GIGABYTES} GB are needed for a root, {free:.0f} are free in {tmp_path}")
+    yield tmp_path / "root"
+    shutil.rmtree(tmp_path / "root", ignore_errors=True)
 
 
 def fresh_root(folder: Path, suite: str, packages: tuple[str, ...] = ()) -> Path:
@@ -54,22 +66,22 @@ def docker_steps() -> list[str]:
     [("bookworm", docker_steps()), ("trixie", ["make setup"])],
     ids=["the steps of the Dockerfile", "Python 3.13, pybullet compiled"],
 )
-def test_setup_as_root(tmp_path: Path, suite: str, commands: list[str]) -> None:
-    root = fresh_root(tmp_path / "root", suite)
+def test_setup_as_root(folder: Path, suite: str, commands: list[str]) -> None:
+    root = fresh_root(folder, suite)
     for command in (*commands, ".venv/bin/scenewright doctor"):
         done = inside(root, command)
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
 
 
-def test_a_user_is_told_what_to_install(tmp_path: Path) -> None:
-    root = fresh_root(tmp_path / "root", "bookworm")
+def test_a_user_is_told_what_to_install(folder: Path) -> None:
+    root = fresh_root(folder, "bookworm")
     done = inside(root, "make setup VENV=/tmp/venv", user="nobody")
     assert done.returncode == 2 and "sudo apt-get install python3 python3-venv" in done.stderr, done.stderr
 
 
-def test_a_user_sets_up_once_it_is_there(tmp_path: Path) -> None:
+def test_a_user_sets_up_once_it_is_there(folder: Path) -> None:
     packages = ("python3", "python3-venv", "libusb-1.0-0", "libgomp1", "libgl1", "libegl1", "libidn2-0")
-    root = fresh_root(tmp_path / "root", "bookworm", packages)
+    root = fresh_root(folder, "bookworm", packages)
     inside(root, f"chown -R nobody /{SOURCE}")
     for command in ("make setup", ".venv/bin/scenewright doctor"):
         done = inside(root, command, user="nobody")
