@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.parameters import AUTO, IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
 from scenewright.stages.ingest.source import Entry
 from scenewright.stages.kit.geometry.transforms import is_rigid
@@ -31,11 +31,12 @@ def select(
     drops: Counter[str] = Counter()
     last_times: dict[str, int] = {}
     counts: Counter[str] = Counter()
+    every = 1 if parameters.every == AUTO else parameters.every
     for entry in entries:
         index = counts[entry.camera_name]
         counts[entry.camera_name] += 1
         stop = len(entries) if parameters.stop is None else parameters.stop
-        if not parameters.start <= index < stop or (index - parameters.start) % parameters.every:
+        if not parameters.start <= index < stop or (index - parameters.start) % every:
             drops[NOT_SELECTED] += 1
             continue
         pose, problem = checked_pose(entry.world_from_camera, has_poses)
