@@ -26,6 +26,7 @@ class SceneBody(Model):
     """`bodies/<name>.urdf` for movable bodies, None for those in static.urdf."""
     parent: str | None = None
     relation: str = "supports"
+    """To its parent; `unknown`: nothing is known to carry it, and `because` says why."""
     world_from_body: Transform
     world_from_reconstructed: Transform | None = Field(None, exclude_if=lambda pose: pose is None)
     """Where the body frame was before physics laid the body down, when that changed its pose. Absent otherwise."""

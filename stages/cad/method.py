@@ -50,6 +50,11 @@ class CadMethod(Protocol):
         """Whether joints of a model that nothing in the map speaks for are held."""
         ...
 
+    @property
+    def largest_error(self) -> float:
+        """Alignment error at which a model that the arrangement moved is none any more [m]."""
+        ...
+
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
         """Return what the method wants to know of seen empty space."""
         ...

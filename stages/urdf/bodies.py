@@ -46,6 +46,7 @@ def _body(
 ) -> BundleBody:
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
+    held = mobile.why if relation == "unknown" else ""
     parent = None if link is None or link.source == SCENE_NODE else link.source
     added = None if replacement is None else replacement.inferred
     if node.model_id is not None:
@@ -75,12 +76,11 @@ def _body(
             joint_values=dict(node.joints),
             held=frozenset() if replacement is None else replacement.held,
             part_colors={} if replacement is None else dict(replacement.part_colors),
-            because="held: it is built in" if is_built_in else _because(added, ""),
+            because="held: it is built in" if is_built_in else _because(added, held),
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
     inferred = () if added is None else tuple(np.array(corners) for corners in added.pieces)
-    held = ""
     if mobile.furniture and node.mark is None and mesh is not None and not _steady(graph, node, mesh, inferred):
         mobile, held = Mobility(False), "it would not stand" if added is None else added.because
     origin = np.eye(4) if node.node_type == "layout" else _bottom(bounds)
