@@ -51,6 +51,11 @@ class CadMethod(Protocol):
         ...
 
     @property
+    def closes_the_room(self) -> bool:
+        """Whether floor, walls and ceiling become closed plates, where the map tells a layout."""
+        ...
+
+    @property
     def largest_error(self) -> float:
         """Alignment error at which a model that the arrangement moved is none any more [m]."""
         ...

@@ -75,6 +75,11 @@ class Ours:
         return True
 
     @property
+    def closes_the_room(self) -> bool:
+        """As the options say."""
+        return self.parameters.shell
+
+    @property
     def largest_error(self) -> float:
         """That of a candidate."""
         return self.parameters.maximum_alignment_error

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.articulations import Articulation, Articulations
 from scenewright.schemas.cad_library import CadLibrary
-from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadScene, JointEvidence
+from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadScene, JointEvidence, ShellFile
 from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.panoptic_map import PanopticMap
@@ -25,6 +25,7 @@ from scenewright.stages.cad.conflicts import placed_pieces
 from scenewright.stages.cad.explained import shares_of
 from scenewright.stages.cad.explaining import explanation_of
 from scenewright.stages.cad.families.stand_in import inferred_of
+from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.giving_back import given_back, moved_off
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
 from scenewright.stages.cad.made_models import is_built_in, is_of_family
@@ -36,6 +37,7 @@ from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.recognition import named_by_people, renamed
 from scenewright.stages.cad.records import cad_graph, scene_file
 from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.cad.shell import drawn, shell_file, shell_of
 from scenewright.stages.cad.stretching import source_of, write_stretched
 from scenewright.stages.cad.surroundings import Piece, footing
 from scenewright.stages.cad.surroundings_files import rounded_area, surroundings_of, write_surface
@@ -90,19 +92,22 @@ def choose_and_write(
     """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4). `moved`: what the log
     shows in two states."""
     graph = renamed(graph, shortlists)
+    free_space = method.free_space(panoptic_map)
+    with context.progress.step("shell"):
+        shell = write_shell(graph, panoptic_map, free_space, context) if method.closes_the_room else None
     with context.progress.step("global check"):
         chosen, selection = select(graph, shortlists, surfaces, method, context.random(CONFLICTS))
-        obstacles, solids = meshes_that_stand(graph, chosen, panoptic_map, context)
+        obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
         if yielding := colliding_built_ins(graph, chosen, surfaces, solids, method.parameters):
             chosen = {name: placement for name, placement in chosen.items() if name not in yielding}
             shortlists = {name: yielded(entry) if name in yielding else entry for name, entry in shortlists.items()}
-            obstacles, solids = meshes_that_stand(graph, chosen, panoptic_map, context)
+            obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
         levels = floor_levels(graph, context.output / "layout")
         arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         while off := moved_off(graph, panoptic_map, arranged, chosen, surfaces, method.largest_error):
             chosen = {name: placement for name, placement in chosen.items() if name not in off}
             shortlists |= {name: given_back(shortlists[name], why) for name, why in off.items()}
-            obstacles, solids = meshes_that_stand(graph, chosen, panoptic_map, context)
+            obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
             arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         move_meshes(arranged, context.output / "meshes")
     built = [name for name, placement in arranged.placements.items() if is_built_in(placement.shape.model)]
@@ -114,7 +119,6 @@ def choose_and_write(
     }
     standing |= {name: placed_pieces(p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items()}
     with context.progress.step("complete what would not stand"):
-        free_space = method.free_space(panoptic_map)
         inferred = completed(final, context.output / "meshes", standing, levels, arranged.shifts, free_space)
     if method.keeps_surroundings:
         with context.progress.step("surroundings"):
@@ -234,7 +238,7 @@ def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) ->
 
 
 def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: PanopticMap, context: Context) -> None:
-    """Copy the meshes of layout nodes and of objects that keep theirs: those that no model was `chosen` for."""
+    """Copy the meshes of layout nodes and of objects, but of those that something was `chosen` for."""
     for node in graph.nodes:
         if node.mesh is None or node.id in chosen:
             continue
@@ -246,12 +250,36 @@ def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: 
         shutil.copyfile(source, folder / f"{node.id}.ply")
 
 
+def write_shell(
+    graph: ContactGraphFile, panoptic_map: PanopticMap, free_space: FreeSpace, context: Context
+) -> ShellFile | None:
+    """Write the plates that close the room (shell.json, layout/<node>.ply) and return them; None without a layout."""
+    if panoptic_map.layout is None:
+        return None
+    bounds = [node for node in graph.nodes if node.node_type == "layout" and node.mesh is not None]
+    meshes = {node.id: load_entity_mesh(panoptic_map.path(str(node.mesh))) for node in bounds}
+    panels = shell_of(graph, panoptic_map.layout, meshes, free_space)
+    for name, mesh in meshes.items():
+        own = [panel for panel in panels if panel.node == name]
+        if own:
+            write_surface(drawn(own, mesh), context.output / "layout" / f"{name}.ply")
+    shell = shell_file(panels, meshes)
+    shell.write(context.output / "shell.json")
+    return shell
+
+
 def meshes_that_stand(
-    graph: ContactGraphFile, chosen: Collection[str], panoptic_map: PanopticMap, context: Context
+    graph: ContactGraphFile,
+    chosen: Collection[str],
+    shell: ShellFile | None,
+    panoptic_map: PanopticMap,
+    context: Context,
 ) -> tuple[dict[str, list[Piece]], dict[str, Solid]]:
-    """Copy layout and the meshes of what no model was `chosen` for; return their convex pieces, and these as solids."""
-    copy_meshes(graph, chosen, panoptic_map, context)
-    pieces = obstacles_of(graph, context.output / "layout", context.output / "meshes")
+    """Copy the meshes of layout beside the shell, and of what no model was `chosen` for; return the convex pieces of
+    all that stands so, and these as solids."""
+    plates = set() if shell is None else {panel.node for panel in shell.panels}
+    copy_meshes(graph, {*chosen, *plates}, panoptic_map, context)
+    pieces = obstacles_of(graph, context.output / "layout", context.output / "meshes", shell)
     return pieces, {name: convex_solid(some) for name, some in pieces.items()}
 
 

@@ -43,6 +43,11 @@ class Thesis:
         return False
 
     @property
+    def closes_the_room(self) -> bool:
+        """Layout stays as it was mapped."""
+        return False
+
+    @property
     def largest_error(self) -> float:
         """What was chosen stays."""
         return math.inf

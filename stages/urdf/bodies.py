@@ -18,7 +18,9 @@ from scenewright.stages.kit.formats.mobility import NAMELESS, STANDS, Mobility, 
 from scenewright.stages.kit.formats.scene_bundle import BundleBody
 from scenewright.stages.kit.formats.scene_supports import furniture_pieces, support_height
 from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.layout_slabs import Slab
 from scenewright.stages.kit.geometry.steadiness import stands_steadily
+from scenewright.stages.kit.measurement.layout_pieces import plates_of
 
 
 def scene_bodies(
@@ -31,8 +33,9 @@ def scene_bodies(
     Raises BadInput for a missing model or mesh.
     """
     replaced = {entry.node: entry for entry in cad_scene.info.replacements if entry.decision != "layout"}
+    plates = {name: tuple(slabs) for name, slabs in plates_of(cad_scene.shell).items()}
     bodies = [
-        _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id))
+        _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id), plates.get(node.id))
         for node in graph.nodes
         if node.id != SCENE_NODE
     ]
@@ -42,7 +45,12 @@ def scene_bodies(
 
 
 def _body(
-    cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, mobile: Mobility, replacement: Replacement | None
+    cad_scene: CadScene,
+    graph: ContactGraphFile,
+    node: GraphNode,
+    mobile: Mobility,
+    replacement: Replacement | None,
+    plates: tuple[Slab, ...] | None,
 ) -> BundleBody:
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
@@ -97,6 +105,7 @@ def _body(
         box=bounds,
         mesh=mesh,
         inferred=tuple(corners - origin[:3, 3] for corners in inferred),
+        slabs=plates,
         because=_because(added, held),
     )
 

@@ -77,6 +77,8 @@ class BundleBody:
     """Number of a collision shape of its mesh -> corners (N, 3), body frame, of the convex pieces in its place."""
     inferred: tuple[np.ndarray, ...] = ()
     """Corners (N, 3), body frame [m], of convex pieces that nobody saw, and that its mesh needs to stand."""
+    slabs: tuple[Slab, ...] | None = None
+    """World frame: the boxes that a floor, wall or ceiling is; None: those that its planes tell."""
     because: str = ""
     """What of it is inferred and why, or why it is held."""
 
@@ -233,6 +235,8 @@ def _mesh_links(
 
 
 def _slabs(body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray) -> list[Slab]:
+    if body.slabs is not None:
+        return list(body.slabs)
     planes = () if node is None else node.planes
     in_world = None
     if body.mesh is not None and len(body.mesh.faces):
