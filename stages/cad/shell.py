@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scenewright.schemas.base import as_transform
-from scenewright.schemas.cad_scene import ShellFile, ShellPanel
+from scenewright.schemas.cad_scene import ShellFile, ShellHinge, ShellPanel
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.panoptic_map import LayoutFile, LayoutPlane
 from scenewright.stages.cad.free_space import FreeSpace
+from scenewright.stages.cad.panes import GAP, IN_WALL, PANE_THICKNESS, Hinge, Pane, pane_of
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.geometry.layout_slabs import (
     FLOOR_THICKNESS,
@@ -43,10 +44,8 @@ DEPTHS = (0.3, 0.6, 0.9)
 """Where a plate is asked whether it was seen empty, as shares of its thickness."""
 OWN = 0.1
 """A wall's surface lies within this of its plane, and a drawn corner was seen so near to what was seen [m]."""
-IN_WALL = 0.2
-"""A door or window so near to a wall's plane is in the wall [m]."""
-CROSSING, PARALLEL = 0.5, 0.95
-"""Cosines of the angle of two walls below which they meet, and from which they are along each other; by eye."""
+CROSSING = 0.5
+"""Two walls meet where the cosine of their angle is below this; by eye."""
 INFERRED_COLOR, INFERRED_SHARE = np.array([140.0, 89.0, 217.0]), 0.35
 """Colour of what nobody saw (sRGB), and how much of it is mixed into that of its plate; by eye."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -65,6 +64,7 @@ class Panel:
     solid: np.ndarray
     """(columns - 1, rows - 1) bool."""
     thickness: float
+    hinge: Hinge | None = None
 
     @property
     def edge(self) -> float:
@@ -103,13 +103,29 @@ def shell_of(
     tops = _tops(faces, layout)
     owners = [_owner(face, walls, meshes) for face in faces]
     seen = np.concatenate([meshes[node.id].vertices for node in walls])
-    in_walls = [node for node in graph.nodes if node.class_name in ("door", "window")]
+    panes = _panes(graph, faces, seen)
     plates: dict[str, list[Panel]] = {}
     for number, (plane, face, owner) in enumerate(zip(planes, faces, owners, strict=True)):
         others = [other for k, other in enumerate(faces) if k != number]
         whole = _cut(_closed(face, others, tops[number]), owner)
-        plates.setdefault(owner, []).append(_coarser(_pierced(whole, plane, in_walls, seen, free_space)))
-    return [*panels, *(panel for own in plates.values() for panel in _with_few_boxes(own) if panel.solid.any())]
+        plates.setdefault(owner, []).append(_coarser(_pierced(whole, plane, panes, seen, free_space)))
+    of_walls = [panel for own in plates.values() for panel in _with_few_boxes(own) if panel.solid.any()]
+    return [*panels, *of_walls, *(_plate(pane) for pane in panes)]
+
+
+def _panes(graph: ContactGraphFile, faces: Sequence[Face], seen: np.ndarray) -> list[Pane]:
+    """Return the doors and windows of a room with these walls; `seen` (N, 3): points of the walls."""
+    nodes = [node for node in graph.nodes if node.class_name in ("door", "window")]
+    frames, floor = [face.frame for face in faces], float(faces[0].frame[2, 3])
+    found = (pane_of(node, frames, seen.mean(axis=0), floor) for node in nodes)
+    return [pane for pane in found if pane is not None]
+
+
+def _plate(pane: Pane) -> Panel:
+    """Return a door or window as a full plate."""
+    edges = [np.linspace(0.0, size, max(2, round(size / (2 * CELL)) + 1)) for size in (pane.width, pane.height)]
+    solid = np.ones((len(edges[0]) - 1, len(edges[1]) - 1), bool)
+    return Panel(pane.node, pane.frame, *edges, solid, PANE_THICKNESS, pane.hinge)
 
 
 def _with_few_boxes(panels: Sequence[Panel]) -> list[Panel]:
@@ -216,9 +232,7 @@ def _cut(face: Face, node: str) -> Panel:
     return Panel(node, face.frame, columns, rows, solid, WALL_THICKNESS)
 
 
-def _pierced(
-    panel: Panel, plane: LayoutPlane, in_walls: Sequence[GraphNode], seen: np.ndarray, free_space: FreeSpace
-) -> Panel:
+def _pierced(panel: Panel, plane: LayoutPlane, panes: Sequence[Pane], seen: np.ndarray, free_space: FreeSpace) -> Panel:
     """Return a plate without the squares that cameras saw through, that an opening of the layout takes up, or in which
     a door or window stands."""
     solid, middles = panel.solid.copy(), panel.middles()
@@ -232,13 +246,13 @@ def _pierced(
     for opening in plane.openings:
         first, last = sorted((start[0] + way * opening.left, start[0] + way * (opening.left + opening.width)))
         solid &= ~_within(middles, (first, opening.sill, last, opening.head))
-    for node in in_walls:
-        for place in node.planes:
-            corners = apply(inverse(panel.frame), np.array(place.corners)) if len(place.corners) == 4 else None
-            is_along = abs(np.array(place.normal) @ panel.frame[:3, 2]) > PARALLEL
-            if corners is not None and is_along and np.abs(corners[:, 2]).max() < IN_WALL:
-                (left, low), (right, top) = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
-                solid &= ~_within(middles, (left, low if low > IN_WALL else -np.inf, right, top))
+    for pane in panes:
+        corners = apply(inverse(panel.frame), pane.corners)
+        if np.abs(corners[:, 2]).max() < IN_WALL:
+            # no square that it reaches into is full: it would rub
+            room = 0.5 * panel.edge + GAP
+            (left, low), (right, top) = corners[:, :2].min(axis=0) - room, corners[:, :2].max(axis=0) + room
+            solid &= ~_within(middles, (left, low, right, top))
     return replace(panel, solid=solid)
 
 
@@ -289,6 +303,7 @@ def _record(panel: Panel, mesh: EntityMesh) -> ShellPanel:
         boxes=tuple(tuple(round(float(value), 4) for value in box) for box in boxes),  # type: ignore[misc]
         open_area=round(float(areas[~panel.solid].sum()), 3),
         seen=round(float(areas[panel.solid & seen].sum()) / full, 3) if full > 0 else 0.0,
+        hinge=None if panel.hinge is None else ShellHinge(**asdict(panel.hinge)),
     )
 
 

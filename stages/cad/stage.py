@@ -238,7 +238,7 @@ def copy_models(arranged: Arrangement, library: CadLibrary, context: Context) ->
 
 
 def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: PanopticMap, context: Context) -> None:
-    """Copy the meshes of layout nodes and of objects, but of those that something was `chosen` for."""
+    """Copy the meshes of layout nodes and of objects that keep theirs: those that no model was `chosen` for."""
     for node in graph.nodes:
         if node.mesh is None or node.id in chosen:
             continue
@@ -253,7 +253,7 @@ def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: 
 def write_shell(
     graph: ContactGraphFile, panoptic_map: PanopticMap, free_space: FreeSpace, context: Context
 ) -> ShellFile | None:
-    """Write the plates that close the room (shell.json, layout/<node>.ply) and return them; None without a layout."""
+    """Write the plates that close the room (shell.json, shell/<node>.ply) and return them; None without a layout."""
     if panoptic_map.layout is None:
         return None
     bounds = [node for node in graph.nodes if node.node_type == "layout" and node.mesh is not None]
@@ -262,7 +262,7 @@ def write_shell(
     for name, mesh in meshes.items():
         own = [panel for panel in panels if panel.node == name]
         if own:
-            write_surface(drawn(own, mesh), context.output / "layout" / f"{name}.ply")
+            write_surface(drawn(own, mesh), context.output / "shell" / f"{name}.ply")
     shell = shell_file(panels, meshes)
     shell.write(context.output / "shell.json")
     return shell
@@ -275,10 +275,9 @@ def meshes_that_stand(
     panoptic_map: PanopticMap,
     context: Context,
 ) -> tuple[dict[str, list[Piece]], dict[str, Solid]]:
-    """Copy the meshes of layout beside the shell, and of what no model was `chosen` for; return the convex pieces of
-    all that stands so, and these as solids."""
-    plates = set() if shell is None else {panel.node for panel in shell.panels}
-    copy_meshes(graph, {*chosen, *plates}, panoptic_map, context)
+    """Copy layout and the meshes of what no model was `chosen` for; return their convex pieces, those of the `shell`
+    where there is one, and these as solids."""
+    copy_meshes(graph, chosen, panoptic_map, context)
     pieces = obstacles_of(graph, context.output / "layout", context.output / "meshes", shell)
     return pieces, {name: convex_solid(some) for name, some in pieces.items()}
 

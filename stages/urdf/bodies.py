@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,12 +35,19 @@ def scene_bodies(
     """
     replaced = {entry.node: entry for entry in cad_scene.info.replacements if entry.decision != "layout"}
     plates = {name: tuple(slabs) for name, slabs in plates_of(cad_scene.shell).items()}
+    panels = () if cad_scene.shell is None else cad_scene.shell.panels
+    doors = {panel.node: panel for panel in panels if panel.hinge is not None}
     bodies = [
         _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id), plates.get(node.id))
         for node in graph.nodes
         if node.id != SCENE_NODE
     ]
-    bodies = held_under_fixed(bodies)
+    bodies = [
+        replace(body, door=doors[body.name], because=f"inferred: a leaf on a hinge; {doors[body.name].hinge.because}")
+        if body.name in doors
+        else body
+        for body in held_under_fixed(bodies)
+    ]
     nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
     return [*bodies, _surroundings(nameless)] if nameless.is_file() else bodies
 
@@ -180,12 +188,21 @@ def _bottom(box: Box) -> np.ndarray:
 
 def _mesh(cad_scene: CadScene, node: GraphNode) -> trimesh.Trimesh | None:
     """Return the mesh that stands for a node without model, world frame, or None when there is none."""
-    folder = "layout" if node.node_type == "layout" else "meshes"
-    file: Path = cad_scene.path(folder) / f"{node.id}.ply"
+    folders = ("shell", "layout") if node.node_type == "layout" else ("meshes",)
+    files = [cad_scene.path(folder) / f"{node.id}.ply" for folder in folders]
+    file = next((file for file in files if file.is_file()), files[-1])
     if not file.is_file():
         return None
     mesh = read_mesh(file, may_be_empty=True, hint="run `cad` again")
     return mesh if len(mesh.faces) else None
+
+
+def seen_floors(cad_scene: CadScene) -> list[trimesh.Trimesh]:
+    """Return what was seen of the floors of a scene, world frame."""
+    floors = [node for node in cad_scene.graph.nodes if node.class_name == "floor"]
+    files = [cad_scene.path("layout") / f"{node.id}.ply" for node in floors]
+    meshes = [read_mesh(file, may_be_empty=True, hint="run `cad` again") for file in files if file.is_file()]
+    return [mesh for mesh in meshes if len(mesh.faces)]
 
 
 def _box(node: GraphNode, mesh: trimesh.Trimesh | None, cad_scene: CadScene) -> Box:
