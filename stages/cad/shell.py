@@ -123,9 +123,9 @@ def _panes(graph: ContactGraphFile, faces: Sequence[Face], seen: np.ndarray) -> 
 
 def _plate(pane: Pane) -> Panel:
     """Return a door or window as a full plate."""
-    edges = [np.linspace(0.0, size, max(2, round(size / (2 * CELL)) + 1)) for size in (pane.width, pane.height)]
-    solid = np.ones((len(edges[0]) - 1, len(edges[1]) - 1), bool)
-    return Panel(pane.node, pane.frame, *edges, solid, PANE_THICKNESS, pane.hinge)
+    columns, rows = (np.linspace(0.0, size, max(2, round(size / (2 * CELL)) + 1)) for size in (pane.width, pane.height))
+    solid = np.ones((len(columns) - 1, len(rows) - 1), bool)
+    return Panel(pane.node, pane.frame, columns, rows, solid, PANE_THICKNESS, pane.hinge)
 
 
 def _with_few_boxes(panels: Sequence[Panel]) -> list[Panel]:
@@ -144,8 +144,8 @@ def _coarser(panel: Panel) -> Panel:
     """Return a plate of squares twice as long, full where all that they are made of are."""
     columns, rows = (np.arange(0, size, 2) for size in panel.solid.shape)
     solid = np.logical_and.reduceat(np.logical_and.reduceat(panel.solid, columns, axis=0), rows, axis=1)
-    edges = (np.append(panel.columns[columns], panel.columns[-1]), np.append(panel.rows[rows], panel.rows[-1]))
-    return Panel(panel.node, panel.frame, *edges, without_corner_contacts(solid), panel.thickness)
+    across, up = np.append(panel.columns[columns], panel.columns[-1]), np.append(panel.rows[rows], panel.rows[-1])
+    return Panel(panel.node, panel.frame, across, up, without_corner_contacts(solid), panel.thickness)
 
 
 def shell_file(panels: Sequence[Panel], meshes: Mapping[str, EntityMesh]) -> ShellFile:
@@ -283,8 +283,10 @@ def _level(node: GraphNode, graph: ContactGraphFile) -> Panel:
     frame[2, 3] = height
     if not is_floor:  # its face looks down
         frame[:3, 1:3] *= -1.0
-    edges = [np.linspace(-0.5 * size, 0.5 * size, max(2, round(size / (2 * CELL)) + 1)) for size in slab.size[:2]]
-    return Panel(node.id, frame, *edges, np.ones((len(edges[0]) - 1, len(edges[1]) - 1), bool), FLOOR_THICKNESS)
+    sizes = (float(slab.size[0]), float(slab.size[1]))
+    columns, rows = (np.linspace(-0.5 * size, 0.5 * size, max(2, round(size / (2 * CELL)) + 1)) for size in sizes)
+    solid = np.ones((len(columns) - 1, len(rows) - 1), bool)
+    return Panel(node.id, frame, columns, rows, solid, FLOOR_THICKNESS)
 
 
 def _record(panel: Panel, mesh: EntityMesh) -> ShellPanel:

@@ -36,14 +36,14 @@ def scene_bodies(
     replaced = {entry.node: entry for entry in cad_scene.info.replacements if entry.decision != "layout"}
     plates = {name: tuple(slabs) for name, slabs in plates_of(cad_scene.shell).items()}
     panels = () if cad_scene.shell is None else cad_scene.shell.panels
-    doors = {panel.node: panel for panel in panels if panel.hinge is not None}
+    doors = {panel.node: (panel, panel.hinge.because) for panel in panels if panel.hinge is not None}
     bodies = [
         _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id), plates.get(node.id))
         for node in graph.nodes
         if node.id != SCENE_NODE
     ]
     bodies = [
-        replace(body, door=doors[body.name], because=f"inferred: a leaf on a hinge; {doors[body.name].hinge.because}")
+        replace(body, door=doors[body.name][0], because=f"inferred: a leaf on a hinge; {doors[body.name][1]}")
         if body.name in doors
         else body
         for body in held_under_fixed(bodies)

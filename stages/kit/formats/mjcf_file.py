@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -21,7 +21,7 @@ def write_mjcf(
     urdf: Urdf,
     joint_values: dict[str, float],
     spawn: np.ndarray | None = None,
-    lamp: Sequence[float] | np.ndarray = (0.0, 0.0, 3.0),
+    lamp: tuple[float, ...] = (0.0, 0.0, 3.0),
 ) -> None:
     """Write a kinematic tree (root link `world`) as MJCF; mesh paths are relative to `path`. `spawn`: world_from_base
     (4, 4) of the site `spawn`, to which a robot can be attached; `lamp`: (3,) where the light hangs [m].

@@ -135,7 +135,7 @@ def write_scene_bundle(
     values = {name: value for body_links in links.values() for name, value in (body_links.joint_values or {}).items()}
     light = light_of([(body.class_name, body.box) for body in ordered])
     base = None if spawn is None else np.array(spawn.world_from_base)
-    write_mjcf(root / "scene.mjcf.xml", combined, values, base, lamp=np.array(light.position))
+    write_mjcf(root / "scene.mjcf.xml", combined, values, base, lamp=light.position)
     records = tuple(_record(body, links[body.name]) for body in ordered)
     scene = InteractiveSceneFile(bodies=records, spawn=spawn, light=light, doubts=doubts)
     scene.write(root / "scene.json")
