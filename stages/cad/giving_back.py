@@ -27,13 +27,17 @@ def moved_off(
     surfaces: Mapping[str, ModelSurface],
     largest_error: float,
 ) -> dict[str, str]:
-    """Return node -> why its model is none any more, for models that the arrangement moved until they lie farther than
-    `largest_error` [m] from what was seen of their thing, root mean square, and farther than before."""
+    """Return node -> why its model is none any more, for models that the arrangement moved aside until they lie farther
+    than `largest_error` [m] from what was seen of their thing, root mean square, and farther than before.
+
+    The way along with what carries it, and up or down onto it, does not count: the graph asks for these.
+    """
     why = {}
     for name, placement in arranged.placements.items():
         link, mesh = graph.parent_link(name), graph.node(name).mesh
-        along = went(arranged, chosen, "" if link is None else link.source)
-        own = went(arranged, chosen, name) - along
+        along, way = went(arranged, chosen, "" if link is None else link.source), went(arranged, chosen, name)
+        along = np.array([*along[:2], way[2]])
+        own = way - along
         if mesh is None or not own.any():
             continue
         points = load_entity_mesh(panoptic_map.path(mesh)).vertices

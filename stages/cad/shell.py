@@ -161,8 +161,8 @@ def drawn(panels: Sequence[Panel], mesh: EntityMesh) -> EntityMesh:
         solid = np.repeat(np.repeat(panel.solid, finer, axis=0), finer, axis=1)
         edges = (_finer(panel.columns, finer), _finer(panel.rows, finer))
         vertices, faces = closed_plate(solid, *edges, panel.thickness)
-        vertices = apply(panel.frame, vertices)
-        parts.append((vertices, faces + first, _colors(vertices, mesh)))
+        colors = _colors(apply(panel.frame, vertices * [1.0, 1.0, 0.0]), mesh)  # the back has those of the face
+        parts.append((apply(panel.frame, vertices), faces + first, colors))
         first += len(vertices)
     vertices, faces, colors = (np.concatenate(column) for column in zip(*parts, strict=True))
     return EntityMesh(vertices, faces, colors)
@@ -316,7 +316,7 @@ def _finer(edges: np.ndarray, finer: int) -> np.ndarray:
 
 def _colors(vertices: np.ndarray, mesh: EntityMesh) -> np.ndarray:
     """Return the colours (V, 3) uint8 of what was seen nearest, and, where nothing was, of all of it towards violet."""
-    distance, nearest = cKDTree(mesh.vertices).query(vertices, distance_upper_bound=OWN + WALL_THICKNESS)
+    distance, nearest = cKDTree(mesh.vertices).query(vertices, distance_upper_bound=OWN)
     unseen = (1 - INFERRED_SHARE) * np.median(mesh.colors, axis=0) + INFERRED_SHARE * INFERRED_COLOR
     colors = np.tile(np.rint(unseen).astype(np.uint8), (len(vertices), 1))
     near = np.isfinite(distance)

@@ -45,6 +45,7 @@ def test_what_is_moved_by_more_than_a_candidate_may_err_gives_its_mesh_back(scen
     why = scene((0.2, 0.0, 0.0))
     assert set(why) == {"box_1"} and "200 mm aside" in why["box_1"] and "141 mm off" in why["box_1"]
     assert not scene((0.1, 0.0, 0.0)), "0.071 m off"
+    assert not scene((0.0, 0.0, 0.4)), "it was put onto what carries it"
     assert not scene((0.2, 0.0, 0.0), limit=math.inf), "the thesis keeps what it chose"
 
 
