@@ -16,6 +16,7 @@ from scenewright.schemas.cad_scene import ShellFile, ShellHinge, ShellPanel
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.panoptic_map import LayoutFile, LayoutPlane
 from scenewright.stages.cad.free_space import FreeSpace
+from scenewright.stages.cad.panels import closed_plate, rectangles_of, without_corner_contacts
 from scenewright.stages.cad.panes import GAP, IN_WALL, PANE_THICKNESS, Hinge, Pane, pane_of
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.geometry.layout_slabs import (
@@ -25,7 +26,6 @@ from scenewright.stages.kit.geometry.layout_slabs import (
     level_of_layout,
     level_slab,
 )
-from scenewright.stages.kit.geometry.panels import closed_plate, rectangles_of, without_corner_contacts
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from
 from scipy.spatial import cKDTree
 

@@ -23,7 +23,6 @@ from scenewright.stages.cad.coloring import part_colors
 from scenewright.stages.cad.completing import completed, hulls_of
 from scenewright.stages.cad.conflicts import placed_pieces
 from scenewright.stages.cad.explained import shares_of
-from scenewright.stages.cad.explaining import explanation_of
 from scenewright.stages.cad.families.stand_in import inferred_of
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.giving_back import given_back, moved_off
@@ -36,6 +35,7 @@ from scenewright.stages.cad.ours import Ours
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.recognition import named_by_people, renamed
 from scenewright.stages.cad.records import cad_graph, scene_file
+from scenewright.stages.cad.scene_explanation import explanation_of
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.shell import drawn, shell_file, shell_of
 from scenewright.stages.cad.stretching import source_of, write_stretched

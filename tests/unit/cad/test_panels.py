@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenewright.stages.kit.geometry.panels import closed_plate, rectangles_of, without_corner_contacts
+from scenewright.stages.cad.panels import closed_plate, rectangles_of, without_corner_contacts
 
 
 def test_a_wall_with_a_door_and_a_window():
