@@ -15,6 +15,7 @@ from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.boxes import minimum_box
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.reading.evidence import colors_of, names_of_map
 from scenewright.stages.kit.open_words.vectors import of_regions, write_vectors
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.splat.language.looks import looks, sight_of
@@ -37,7 +38,8 @@ def run(
     """
     encoder = open_encoder(parameters, weights, context.device)
     entities = [entity for entity in panoptic_map.info.entities if entity.vertices]
-    meshes = [load_entity_mesh(panoptic_map.path(entity.mesh)).vertices for entity in entities]
+    loaded = [load_entity_mesh(panoptic_map.path(entity.mesh)) for entity in entities]
+    meshes, names = [mesh.vertices for mesh in loaded], names_of_map(panoptic_map)
     sights = []
     with FrameReader(sequence.path("frames.mcap")) as reader:
         if "depth" not in reader.streams:
@@ -66,8 +68,12 @@ def run(
                 class_name=entity.class_name,
                 box=minimum_box(np.asarray(points)),
                 looks=int(count),
+                names=names[entity.instance].shares,
+                seen=names[entity.instance].looks,
+                said=names[entity.instance].said,
+                colors=colors_of(mesh.colors),
             )
-            for entity, points, count in zip(entities, meshes, counts, strict=True)
+            for entity, points, mesh, count in zip(entities, meshes, loaded, counts, strict=True)
         ),
     )
     info.write(context.output / "language.json")

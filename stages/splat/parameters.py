@@ -14,7 +14,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.splat import Splat, SplatViews
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.open_words.encoder import checked_text
-from scenewright.stages.kit.open_words.options import EXTRAS, WEIGHTS, EncoderParameters, encoder_files
+from scenewright.stages.kit.open_words.options import EXTRAS, READING_FILES, WEIGHTS, EncoderParameters, encoder_files
 from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 QUERIES = External("queries.toml: texts that are true of something there, with its boxes, and texts that are not")
@@ -89,7 +89,7 @@ def check_query(parameters: QueryParameters, inputs: Mapping[str, Any]) -> None:
 
 def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
     """Return the files of data/ that pictures and words are held against each other with."""
-    return (*encoder_files(parameters), "words/calibration.toml")
+    return (*encoder_files(parameters), *READING_FILES, "words/calibration.toml")
 
 
 BUILD = Stage(
