@@ -169,6 +169,8 @@ def _hear(part: str, heard: _Heard) -> None:
     ):
         first += 1
     start = next((k for k in range(first, len(words)) if _names_thing(" ".join(words[k:]))), len(words))
+    if start == len(words) and words and words[-1].isalpha() and words[-1] not in {*known, *OBJECTS}:
+        start = len(words) - 1  # no noun that anybody knows, but where one would stand
     if start < len(words):
         heard.nouns.append(_as_known(" ".join(words[start:])))
     for word in words[:start]:
