@@ -159,7 +159,7 @@ def _thing(given: str, words: str, asks: Asks = "where", may_be_anything: bool =
 def _hear(part: str, heard: _Heard) -> None:
     """Take in a noun phrase: the longest noun that it ends in, and the adjectives before that."""
     head, _, of_what = part.partition(" of ")
-    if of_what and is_noun(_bare(head)):
+    if of_what and not is_noun(_bare(part)) and is_noun(_bare(head).split(" ")[-1]):
         part = head
         heard.unread.append(f"of {of_what}")
     words, known = _bare(part).split(), adjectives()
