@@ -56,6 +56,7 @@ _TAIL = re.compile(
 def plain(text: str) -> str:
     """Return a question in small letters without punctuation and what ends it politely."""
     bare = re.sub(r"[?!.,;:\"“”]+", " ", text.lower().replace("’", "'"))
+    bare = re.sub(r"\b(?:kind|sort|piece|pair)s? of\b", " ", bare)
     return _TAIL.sub("", " ".join(bare.split()))
 
 

@@ -31,8 +31,8 @@ from scenewright.stages.kit.open_words.reading.patterns import (
 )
 
 DETERMINERS = frozenset(
-    "the a an my our your his her their this that these those some any all every each of one there other another no "  # noqa: SIM905
-    "please kind sort piece pair me us what which is are old new nice".split()
+    "the a an my our your his her their this that these those some any all every each one there other another no "  # noqa: SIM905
+    "please me us what which is are old new nice".split()
 )
 """Words before a noun that say nothing of the thing."""
 OBJECTS = frozenset("thing things object objects something anything stuff one ones item items".split())  # noqa: SIM905
