@@ -108,6 +108,8 @@ class Meanings:
             return NOTHING
         if noun == written:
             return Meaning(fit.named, "vocabulary", "named so")
+        if own and noun == own.replace("_", " ") and class_named(written) == own:
+            return Meaning(fit.named, "vocabulary", "a kind of it")  # the label of a network, by its class
         relation = relation_of(self._table, noun, name) if self._table is not None else "none"
         if own == name:
             at_least = fit.relations["kind"] if relation == "kind" else fit.synonym
