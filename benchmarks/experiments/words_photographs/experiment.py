@@ -3,7 +3,8 @@
 Phrases were drawn beforehand (drawing.py). `thesis` asks the language field of a splat with the embedded encoder, at
 the size that fits best in the image that shows a right thing best, and always answers with one Gaussian. In
 `thesis_witnesses` every Gaussian has instead of vectors what the same masks say of it in the images that show it, and
-nouns are read as in ours; it always answers too. `entities` asks what images show of every entity of the map, by the
+nouns are read as in ours; it always answers too. `ours_splat` asks pieces of that splat by the names of the entities
+that they belong to, without crops. `entities` asks what images show of every entity of the map, by the
 encoder. `ours` asks the same entities by names with probabilities, colours, sizes and the contact graph. `ours_masks`
 does without the classifier of crops, `ours_nouns` without the sentence encoder too, `ours_classes` without WordNet too.
 
@@ -41,7 +42,7 @@ from benchmarks.words.asked import Query
 
 CASE = "photographs"
 KNOWN_SETS = ("coco-80", "ade20k-31", "pascal-voc")
-"""Label sets of the networks: a word that is a label there is one that they know."""
+"""Label sets of the networks that give masks."""
 ALWAYS = ("thesis", "thesis_witnesses")
 """Arms that always answer."""
 
@@ -52,7 +53,7 @@ class PhotographsParameters(Parameters):
     data: Path = Field(Path("../shared/data"), description="Folder with the real logs and networks of others")
     steps: int = Field(200, ge=1, description="Steps of training the field")
     sentences: Path | None = Field(None, description="Folder of a sentence encoder; else that of an installed package")
-    threshold: float = Field(0.5, ge=0, le=1, description="Probability from which on ours answers (generated rooms)")
+    threshold: float = Field(0.042, ge=0, le=1, description="Probability from which on ours answers (words_relations)")
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Told:
     log: str
     kind: str
     known: bool
-    """Whether its noun is a label of one of the networks."""
+    """Whether its noun names a class of which one of the networks has a label."""
     present: bool
     chance: float
     """Probability, or relevancy, of its first place."""
@@ -90,11 +91,10 @@ def asked_of(log: str) -> list[tuple[Asked, bool]]:
 
 
 def is_known(text: str) -> bool:
-    """Whether the noun of a phrase is a label of a network, under its own name or a synonym of the tables."""
+    """Whether the noun of a phrase names a class that a network has a label for."""
     phrase = heard(text)
-    if phrase is None:
-        return False
-    return any(load_label_set(name).find(noun) is not None for name in KNOWN_SETS for noun in phrase.nouns)
+    classes = {label.class_name for name in KNOWN_SETS for label in load_label_set(name).labels}
+    return phrase is not None and any(name in classes for name in phrase.classes())
 
 
 def seeds_of(bench: Bench, case: str) -> Sequence[str]:
@@ -158,8 +158,8 @@ def way_of(room: AskedPhotographs, arm: str, given: PhotographsParameters) -> Ca
         return way.find
     if arm == "thesis_witnesses":
         return WitnessWay(room, layers(arm, given)).find
-    labels = room.labels_with_crops if arm == "ours" else room.labels
-    finder = Finder(labels, encoder, meanings=layers(arm, given))
+    labels = {"ours": "labels_with_crops", "ours_splat": "language"}.get(arm, "labels")
+    finder = Finder(getattr(room, labels), encoder, meanings=layers(arm, given))
     if arm == "entities":
         finder.has_names = False
     return lambda query: entity_places(room, finder, query, related=arm != "entities")
@@ -168,7 +168,7 @@ def way_of(room: AskedPhotographs, arm: str, given: PhotographsParameters) -> Ca
 def layers(arm: str, given: PhotographsParameters) -> Meanings:
     """Return the layers of words of an arm."""
     folder = given.sentences or installed_sentences()
-    with_sentences = arm in ("ours", "ours_masks", "thesis_witnesses") and folder is not None
+    with_sentences = arm in ("ours", "ours_splat", "ours_masks", "thesis_witnesses") and folder is not None
     encoder = SentenceEncoder(folder) if with_sentences and folder is not None else None
     return Meanings(encoder, with_nouns=arm != "ours_classes")
 
@@ -243,6 +243,7 @@ EXPERIMENT = Experiment(
     ),
     arms={
         "ours": "ours",
+        "ours_splat": "ours, pieces of the splat",
         "ours_masks": "ours, without a classifier of crops",
         "ours_nouns": "so, without the sentence encoder",
         "ours_classes": "so, without WordNet",

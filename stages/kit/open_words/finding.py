@@ -97,14 +97,15 @@ class Finder:
 
     def fits(self, text: str, phrase: Phrase | None = None) -> Fits:
         """Return how well a text fits every region; `phrase`: what it was read as, read here where it is not given."""
+        phrase = (phrase or heard(text)) if self.by_names else None
+        named = np.array([match.probability for match in self._matches(phrase)]) if phrase is not None else None
+        if named is not None and self.is_strange:
+            return Fits(np.zeros(len(named)), None, None, named, self._lit(named))
         fits_of_text = fits(
             self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration, self.classes
         )
-        phrase = (phrase or heard(text)) if self.by_names else None
-        if phrase is not None:
-            named = np.array([match.probability for match in self._matches(phrase)])
-            chances = named if self.is_strange else with_witness(named, fits_of_text.looks)
-            return replace(fits_of_text, probabilities=chances)
+        if named is not None:
+            return replace(fits_of_text, probabilities=with_witness(named, fits_of_text.looks))
         believed = self.calibration.strange if self.is_strange else 1.0
         return replace(fits_of_text, probabilities=believed * fits_of_text.probabilities)
 
@@ -152,6 +153,13 @@ class Finder:
 
     def _matches(self, phrase: Phrase) -> list[Match]:
         return matches(phrase, self._things, self.meanings)
+
+    def _lit(self, probabilities: np.ndarray) -> np.ndarray | None:
+        """Return (N,) per Gaussian the probability of its likeliest piece; None without any."""
+        pieces = self.vectors.pieces
+        if not len(self.vectors.means):
+            return None
+        return np.where(pieces >= 0, probabilities[pieces], 0.0).max(axis=0, initial=0.0)
 
     def _one_an_entity(self, order: list[int]) -> list[int]:
         """Return regions of which no two are pieces of one entity, where names answer: they all have its name."""

@@ -81,6 +81,7 @@ def with_classifier(
     heard = dict(shares)
     for k in np.flatnonzero(mean >= LEAST):
         label = labels[k]
-        if extent <= LARGEST_EXTENT.get(class_named(label), np.inf):
+        head = class_named(label) or class_named(label.split(" ")[-1])  # a coffee mug is a mug
+        if extent <= LARGEST_EXTENT.get(head, np.inf):
             heard[label] = round(heard.get(label, 0.0) + BELIEVED * left * float(mean[k]), 4)
     return heard

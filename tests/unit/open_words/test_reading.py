@@ -193,6 +193,9 @@ def test_names_are_the_posteriors_of_the_map() -> None:
     nameless = names_of(entity.model_copy(update={"class_name": "object"}), reason)
     assert dict(nameless.shares) == {"bowl": 0.06}
     assert dict(names_of(entity, None).shares) == {"cup": 1.0}
+    curtain = reason.model_copy(update={"said": {"curtain": 0.5, "wall": 0.2}, "runners_up": {}, "posterior": 1.0})
+    assert dict(names_of(entity.model_copy(update={"class_name": "object"}), curtain).shares) == {"curtain": 0.5}
+    assert dict(names_of(entity, curtain).shares) == {"cup": 1.0}
 
 
 def thing(instance: int, extent: float = 0.1, colors: dict[str, float] | None = None, **shares: float) -> Thing:

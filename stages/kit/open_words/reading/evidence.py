@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.schemas.panoptic_map import Because, Entity, PanopticMap
-from scenewright.schemas.vocabulary import UNNAMED
+from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.kit.open_words.reading.colors import color_shares
 
 SEVERAL_LOOKS = 5.0
@@ -51,10 +51,21 @@ def names_of(entity: Entity, reason: Because | None) -> Names:
     if reason is None:
         return Names(named)
     shares = dict(reason.runners_up)
+    left = 0.0 if named else 1.0 - sum(shares.values())
+    shares |= {
+        name: min(score, left) for name, score in reason.said.items() if name not in shares and _is_fitting(name)
+    }
     if named:
         shares[entity.class_name] = ALONE if reason.posterior is None else reason.posterior
     said = reason.said.get(entity.class_name, 0.0) * reason.looks
     return Names({name: share for name, share in shares.items() if share > 0}, reason.looks, said)
+
+
+def _is_fitting(class_name: str) -> bool:
+    """Whether a class is fitted to a room and no thing (a curtain, a door): the map weighs no names of these, so that
+    the mean score of masks stands for a posterior."""
+    entry = next((each for each in load_vocabulary().classes if each.name == class_name), None)
+    return entry is not None and entry.kind == "stuff" and class_name not in ("floor", "wall", "ceiling")
 
 
 def colors_of(colors: np.ndarray) -> dict[str, float]:
