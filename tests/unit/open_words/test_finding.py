@@ -27,7 +27,7 @@ NAMES = ({"cup": 0.9}, {"cup": 0.9}, {"chair": 0.6}, {})
 def language(tmp_path: Path) -> LanguageMap:
     regions = tuple(
         LanguageRegion(
-            instance=k, class_name=next(iter(names), "object"), box=BOX, looks=1, names=names, seen=40, said=20
+            instance=k, class_name=next(iter(names), "object"), box=box(n), looks=1, names=names, seen=40, said=20
         )
         for n, (k, names) in enumerate(zip((7, 7, 8, 9), NAMES, strict=True))
     )
