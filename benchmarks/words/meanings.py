@@ -49,7 +49,7 @@ def pairs() -> list[tuple[str, str, bool]]:
 
 def shares(rows: list[tuple[str, str, bool]]) -> dict[str, float]:
     """Return relation by WordNet -> share of right pairs."""
-    told = defaultdict(list)
+    told: dict[str, list[bool]] = defaultdict(list)
     for noun, name, right in rows:
         told[relation_of(_table(), noun, name)].append(right)
     return {each: (sum(told[each]) + 1) / (len(told[each]) + 2) for each in (*CLOSE, "sister", "cousin", "none")}

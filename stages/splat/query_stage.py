@@ -36,10 +36,13 @@ def run(
     finder = Finder(language, encoder)
     graph = contact_graph.info if contact_graph is not None else None
     phrase = _read(text, context)
-    is_related = graph is not None and phrase is not None and phrase.other is not None
+    parts: tuple[str, ...] = (text,)
+    relation = ""
     if graph is not None and phrase is not None and phrase.other is not None:
         _check_same_map(language, graph)
         ranking = finder.find_related(phrase, graph)
+        parts = (phrase.thing(), phrase.other.thing())
+        relation = f" {phrase.relation} ".join(parts)
     else:
         ranking = finder.find(text, phrase)
     nodes = {node.instance: node.id for node in graph.nodes if node.instance} if graph is not None else {}
@@ -47,8 +50,6 @@ def run(
     likely = [answer for answer in ranking if answer.probability >= least][: parameters.most]
     below = next((answer for answer in ranking if answer.probability < least), None)
     masks = [finder.index.members(answer.region) for answer in likely]
-    other = phrase.other if phrase is not None and is_related else None
-    parts = (text,) if phrase is None or other is None else (phrase.thing(), other.thing())
     unread = tuple(word for part in parts for word in encoder.unread(part))
     AnswersFile(
         text=text,
@@ -59,7 +60,7 @@ def run(
         least_probability=least,
         understood="" if phrase is None else phrase.said(),
         unread=unread,
-        relation=" ".join((parts[0], phrase.relation, parts[1])) if phrase is not None and other is not None else "",
+        relation=relation,
         answers=tuple(_answer(finder, answer, nodes) for answer in likely),
         next_best=None if below is None else _answer(finder, below, nodes),
     ).write(context.output / "answers.json")

@@ -95,7 +95,7 @@ def truth(noun: str, thing: Annotated) -> str:
     asked = senses_named(noun)
     if asked & thing.senses or asked & _above(thing.senses):
         return "true"
-    may_be = class_named(noun) == thing.class_name != UNNAMED or _above(asked) & thing.senses
+    may_be = class_named(noun) == thing.class_name != UNNAMED or bool(_above(asked) & thing.senses)
     if thing.class_name != UNNAMED:
         may_be = may_be or relation_of(table(), noun, thing.class_name) in ("same", "kind", "broader")
     return "maybe" if may_be else "false"
