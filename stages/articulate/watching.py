@@ -107,14 +107,7 @@ class Watched:
 
 @compiled
 def _in_sight(
-    steps: np.ndarray,
-    shift: np.ndarray,
-    intrinsics: np.ndarray,
-    height: int,
-    width: int,
-    i: int,
-    j: int,
-    count: int,
+    steps: np.ndarray, shift: np.ndarray, intrinsics: np.ndarray, height: int, width: int, i: int, j: int, count: int
 ) -> tuple[int, int]:
     """Return from and to which of the `count` voxels of a row (i, j) any can lie in the image, one more at either end.
 
