@@ -107,7 +107,7 @@ REPACKED = 1.2
 
 def _estimate(parameters: IngestParameters, inputs: Inputs) -> Estimate:
     log = inputs["log"]
-    share = 1.0 if parameters.every == AUTO else 1 / parameters.every
+    share = 1 / parameters.every if isinstance(parameters.every, int) else 1.0
     if log.megapixels is not None and log.frames is not None:
         frames = min(log.frames * share, parameters.max_frames or log.frames)
         megapixels = frames * log.frame_megapixels

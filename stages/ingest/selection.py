@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-from scenewright.stages.ingest.parameters import AUTO, IngestParameters
+from scenewright.stages.ingest.parameters import IngestParameters
 from scenewright.stages.ingest.pose_conventions import converted
 from scenewright.stages.ingest.source import Entry
 from scenewright.stages.kit.geometry.transforms import is_rigid
@@ -31,7 +31,7 @@ def select(
     drops: Counter[str] = Counter()
     last_times: dict[str, int] = {}
     counts: Counter[str] = Counter()
-    every = 1 if parameters.every == AUTO else parameters.every
+    every = parameters.every if isinstance(parameters.every, int) else 1
     for entry in entries:
         index = counts[entry.camera_name]
         counts[entry.camera_name] += 1
