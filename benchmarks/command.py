@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,7 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
         return code
     results = Results(experiment, bench, shown(experiment, records))
     missing = [trial for trial in trials if trial not in records]
-    print(write_results(results, _as_recorded(words, options), missing))
+    print(write_results(results, _as_recorded(words, options, experiment.places), missing))
     if options.publish:
         print(f"{publish(results, missing, kept=options.kept)}: `make figures` shows it", file=sys.stderr)
     problems = experiment.problems(results) if experiment.problems else ()
@@ -78,9 +78,10 @@ def run(experiment: Experiment, words: Sequence[str]) -> int:
     return code or (UNMET if problems else 0)
 
 
-def _as_recorded(words: Sequence[str], options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the command line that stands beside figures: where they were written says nothing."""
-    kept = ["FOLDER" if word == str(options.out) else word for word in words if word != "--publish"]
+def _as_recorded(words: Sequence[str], options: argparse.Namespace, places: Collection[str] = ()) -> tuple[str, ...]:
+    """Return the command line that stands beside figures: where they were written, and what lay where, says nothing."""
+    folders = {str(options.out), *(str(getattr(options, name)) for name in places)}
+    kept = ["FOLDER" if word in folders else word for word in words if word != "--publish"]
     return ("python", "-m", "benchmarks", *kept)
 
 
