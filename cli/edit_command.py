@@ -21,6 +21,7 @@ from scenewright.schemas.errors import UsageError
 from scenewright.schemas.hand_written import UprightBox
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.plain_text import cleaned
+from scenewright.stages.kit.open_words.reading.names import class_named
 
 if TYPE_CHECKING:
     from scenewright.cli.viewing.desk.subject import Subject
@@ -88,7 +89,8 @@ def _said(field: Form, given: Mapping[str, Any]) -> Any:
         return [given[f"{ordinal}_"] for ordinal in ORDINALS[: field["fewest"]]]
     if (flag := FLAGS.get(field["name"])) is not None:
         return field["choices"][given[f"{flag}_"]]
-    return given[f"{_short(field['name'])}_"]
+    typed = given[f"{_short(field['name'])}_"]
+    return (class_named(typed) or typed) if field["kind"] == "class" and isinstance(typed, str) else typed
 
 
 def _short(name: str) -> str:

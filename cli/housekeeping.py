@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from scenewright.cli import edit_command
+from scenewright.cli.ask_command import ask
 from scenewright.cli.batch_command import batch
 from scenewright.cli.collection_command import gc
 from scenewright.cli.comparison_command import diff
@@ -302,6 +303,7 @@ COMMANDS: tuple[tuple[Callable[..., Any], str], ...] = (
     (batch, "Pipelines"),
     (view, "Artifacts"),
     (inspect, "Artifacts"),
+    (ask, "Artifacts"),
     (explain, "Artifacts"),
     (verify, "Artifacts"),
     (urdf_check, "Artifacts"),

@@ -21,6 +21,14 @@ class LanguageRegion(Model):
     """Of a piece of a thing that a map knows, the thing's."""
     looks: Count
     """Pieces of pictures that its vector is the mean of; 0: no picture shows it, and no word finds it by them."""
+    names: dict[str, float] = Field(default_factory=dict, exclude_if=lambda names: not names)
+    """Class -> posterior by the map's evidence; what is missing to 1 is for none of them. Absent without a map."""
+    seen: float = Field(default=0.0, exclude_if=lambda seen: not seen)
+    """In how many images the map saw that entity; absent where that is not known."""
+    said: float = Field(default=0.0, exclude_if=lambda said: not said)
+    """In how many of them masks gave it its class (sum of scores)."""
+    colors: dict[str, float] = Field(default_factory=dict, exclude_if=lambda colors: not colors)
+    """Name of a colour -> share of its surface; absent without a map."""
 
 
 class LanguageMapFile(Model):
@@ -69,6 +77,8 @@ class Answer(Model):
     """Node of the contact graph, where one was given."""
     other: str = ""
     """Node that it stands on, in or beside, where the words say so."""
+    doubtful: bool = Field(default=False, exclude_if=lambda doubtful: not doubtful)
+    """Whether it rests on one name that few images gave, or that is little likelier than others."""
     place: Vector3 | None = None
     """On it, where its box has nothing in the middle; None in files of before."""
     box: Box
@@ -87,6 +97,8 @@ class AnswersFile(Model):
     strange: bool = False
     """Whether that is so little that probabilities are small for whatever is asked."""
     least_probability: float
+    understood: str = Field(default="", exclude_if=lambda line: not line)
+    """What of the text was understood, and what not, in a line."""
     unread: tuple[str, ...]
     """Words that the encoder is known never to have read."""
     relation: str = ""

@@ -11,8 +11,8 @@ from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.formats.part_colors import recolored, vertex_colors
 from scenewright.stages.kit.geometry.transforms import transform_from
+from scenewright.stages.kit.open_words.reading.colors import color_shares
 from scenewright.stages.kit.rendering.ray_casting import SceneRenderer
-from scenewright.stages.splat.training.words.colors import color_shares
 from scenewright.stages.splat.training.words.lexicon import Lexicon, Thing
 from scenewright.stages.splat.training.words.samples import RENDERED, Samples, numbered
 

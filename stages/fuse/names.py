@@ -37,6 +37,8 @@ LOOKS = 8.0
 """Looks are alike: however many there are, they count for fewer than so many."""
 LIKELY = 0.5
 """Posterior from which on a name is given."""
+RUNNERS_UP = 5
+"""Names that come next and are kept, for words that ask for one of them; by eye."""
 UNUSUAL = 1.5
 """A thing may be this much larger than usual where masks are as sure of its name as they usually are."""
 
@@ -70,7 +72,7 @@ class Naming:
     class_id: int
     posterior: float
     runners_up: tuple[tuple[int, float], ...]
-    """The next two classes with their posteriors."""
+    """The next classes with their posteriors."""
     rule: str
 
 
@@ -110,10 +112,10 @@ def name_of(said: Said, rates: Rates, extent: float, vocabulary: Vocabulary, unn
     weights = np.exp(np.minimum([odds[c] for c in order], 50.0))
     rows = [(c, round(float(w / (1.0 + weights.sum())), 3)) for c, w in zip(order, weights, strict=True)]
     if rows and rows[0][1] >= LIKELY:
-        return Naming(*rows[0], tuple(rows[1:3]), "the likeliest of the names that masks gave it")
+        return Naming(*rows[0], tuple(rows[1 : 1 + RUNNERS_UP]), "the likeliest of the names that masks gave it")
     left = round(1.0 - sum(p for _, p in rows), 3)
     rule = "no name is likely enough" if rows else "no thing of its size has its name" if names else "nobody named it"
-    return Naming(unnamed, left, tuple(rows[:2]), rule)
+    return Naming(unnamed, left, tuple(rows[:RUNNERS_UP]), rule)
 
 
 def prior_odds(class_name: str) -> float:

@@ -10,7 +10,7 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.language_map import LanguageMap
 from scenewright.stages.kit.open_words.embedded import EmbeddedEncoder
 from scenewright.stages.kit.open_words.encoder import check_width, checked_text
-from scenewright.stages.kit.open_words.finding import Finder
+from scenewright.stages.kit.open_words.finding import Finder, heard
 from scenewright.stages.plan.domain import DOMAIN
 
 LEAST_PROBABILITY = 0.5
@@ -29,7 +29,7 @@ def named_goal(
     """Return the literals with the likeliest fitting node in place of every quoted text.
 
     Of the nodes those count that may stand there: only an item can be on something; and where a text ends in the class
-    of any of them ("desk", "white cup"), those of that class. A class alone needs no probability.
+    of any of them or a synonym ("desk", "white mug"), those of that class. A class alone needs no probability.
 
     Raises UsageError without a language map, for a text that is none, and where no node is likely enough; BadInput for
     a map of other things.
@@ -75,8 +75,14 @@ def _likeliest(
     longest = max((len(name) for name in names.values() if words[-len(name) :] == name), default=0)
     if longest:
         candidates = [(k, node) for k, node in candidates if len(names[k]) == longest and words[-longest:] == names[k]]
+        alone = longest == len(words)
+    else:
+        phrase = heard(text)
+        of_class = [(k, node) for k, node in candidates if phrase is not None and node.class_name in phrase.classes()]
+        candidates = of_class or candidates
+        alone = bool(of_class) and phrase is not None and phrase.thing() == " or ".join(phrase.nouns)
     best = max(((float(fits.probabilities[k]), node.id) for k, node in candidates), default=(0.0, "nothing"))
-    if best[0] < LEAST_PROBABILITY and longest < len(words):
+    if best[0] < LEAST_PROBABILITY and not alone:
         raise UsageError(
             f"goal: {_lacking(text, finder)}: {best[1]} is the likeliest, with probability {best[0]:.2f}",
             hint="name the node, or say it in other words",

@@ -15,6 +15,7 @@ from scenewright.schemas.sequence import Sequence
 from scenewright.stages.kit.acting.errors import RATES_NAME
 from scenewright.stages.kit.acting.eyes.options import SegmenterParameters
 from scenewright.stages.kit.estimates import grows_with
+from scenewright.stages.kit.open_words.options import READING_FILES
 from scenewright.stages.kit.simulation.robot_option import robot_files, robot_option
 from scenewright.stages.kit.stage import External, Optionally, Stage
 
@@ -94,7 +95,8 @@ class PlanParameters(SegmenterParameters):
 
 def plan_files(parameters: PlanParameters) -> tuple[str, ...]:
     """Return the files of `data/` that describe the robot, and what words need."""
-    return (*robot_files(parameters.robot), RATES_NAME, "words/two_towers.safetensors", "words/calibration.toml")
+    words = (*READING_FILES, "words/two_towers.safetensors", "words/calibration.toml")
+    return (*robot_files(parameters.robot), RATES_NAME, *words)
 
 
 def check_options(parameters: PlanParameters, inputs: Mapping[str, Any]) -> None:

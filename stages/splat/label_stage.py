@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
 from scenewright.schemas.panoptic_map import PanopticMap
+from scenewright.schemas.scene_parts import Box
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
@@ -15,9 +16,11 @@ from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.boxes import minimum_box
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.reading.evidence import colors_of, names_of_map
 from scenewright.stages.kit.open_words.vectors import of_regions, write_vectors
 from scenewright.stages.kit.stage import Context
-from scenewright.stages.splat.language.looks import looks, sight_of
+from scenewright.stages.splat.language.classifier import CropClassifier, with_classifier
+from scenewright.stages.splat.language.looks import Sight, crops_of, looks, sight_of
 from scenewright.stages.splat.parameters import LabelParameters
 from scenewright.stages.splat.views import evenly, posed_frames
 
@@ -27,6 +30,8 @@ def run(
     sequence: Sequence,
     trajectory: Trajectory | None,
     weights: Path | None,
+    classifier: Path | None,
+    classifier_labels: Path | None,
     *,
     parameters: LabelParameters,
     context: Context,
@@ -37,7 +42,8 @@ def run(
     """
     encoder = open_encoder(parameters, weights, context.device)
     entities = [entity for entity in panoptic_map.info.entities if entity.vertices]
-    meshes = [load_entity_mesh(panoptic_map.path(entity.mesh)).vertices for entity in entities]
+    loaded = [load_entity_mesh(panoptic_map.path(entity.mesh)) for entity in entities]
+    meshes, names = [mesh.vertices for mesh in loaded], names_of_map(panoptic_map)
     sights = []
     with FrameReader(sequence.path("frames.mcap")) as reader:
         if "depth" not in reader.streams:
@@ -51,6 +57,10 @@ def run(
                 sights.append(sight_of(reader, frame_read, frame_read.depth, inverse(poses[frame])))
     with context.progress.step("look"):
         vectors, counts = looks(meshes, sights, encoder)
+        boxes = [minimum_box(np.asarray(points)) for points in meshes]
+        shares = [dict(names[entity.instance].shares) for entity in entities]
+        if classifier is not None and classifier_labels is not None:
+            shares = _heard(CropClassifier(classifier, classifier_labels), shares, boxes, meshes, sights)
     write_vectors(context.output, of_regions(vectors))
     info = LanguageMapFile(
         source="panoptic_map",
@@ -64,12 +74,32 @@ def run(
             LanguageRegion(
                 instance=entity.instance,
                 class_name=entity.class_name,
-                box=minimum_box(np.asarray(points)),
+                box=box,
                 looks=int(count),
+                names=of_entity,
+                seen=names[entity.instance].looks,
+                said=names[entity.instance].said,
+                colors=colors_of(mesh.colors),
             )
-            for entity, points, count in zip(entities, meshes, counts, strict=True)
+            for entity, box, mesh, count, of_entity in zip(entities, boxes, loaded, counts, shares, strict=True)
         ),
     )
     info.write(context.output / "language.json")
     summary = {"entities": len(entities), "seen": int(np.count_nonzero(counts)), "pictures": len(sights)}
     return LanguageMap(context.output, outcome="ok" if entities else "empty", summary=summary)
+
+
+def _heard(
+    classifier: CropClassifier,
+    shares: list[dict[str, float]],
+    boxes: list[Box],
+    meshes: list[np.ndarray],
+    sights: list[Sight],
+) -> list[dict[str, float]]:
+    """Return the names of entities with what a classifier says of their crops."""
+    crops = crops_of(meshes, sights, classifier.side)
+    scores = np.split(classifier.scores(crops.pictures), np.cumsum(crops.counts)[:-1]) if shares else []
+    return [
+        with_classifier(of_entity, rows, classifier.labels, max(box.size))
+        for of_entity, rows, box in zip(shares, scores, boxes, strict=True)
+    ]

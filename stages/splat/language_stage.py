@@ -20,6 +20,7 @@ from scenewright.stages.kit.geometry.boxes import minimum_box
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.open_words.answering import members_of
 from scenewright.stages.kit.open_words.opening import open_encoder
+from scenewright.stages.kit.open_words.reading.evidence import colors_of, names_of_map
 from scenewright.stages.kit.open_words.vectors import Vectors, write_vectors
 from scenewright.stages.kit.rendering.splatting.rasterizer import View
 from scenewright.stages.kit.stage import Context
@@ -129,7 +130,9 @@ def _name_regions(
     """Return regions with the entities that their Gaussians (`parts`) belong to: instance, class and, of a thing, its
     box; walls and floors have pieces, which have boxes of their own."""
     entities = [entity for entity in panoptic_map.info.entities if entity.vertices]
-    surfaces = [np.asarray(load_entity_mesh(panoptic_map.path(entity.mesh)).vertices) for entity in entities]
+    meshes = [load_entity_mesh(panoptic_map.path(entity.mesh)) for entity in entities]
+    surfaces, names = [np.asarray(mesh.vertices) for mesh in meshes], names_of_map(panoptic_map)
+    colors = [colors_of(mesh.colors) for mesh in meshes]
     owners, classes, boxes = nearest_entities(means, surfaces), load_vocabulary(), dict[int, Box]()
     named_regions = []
     for region, part in zip(regions, parts, strict=True):
@@ -138,7 +141,15 @@ def _name_regions(
             named_regions.append(region)
             continue
         entity = entities[number]
-        fields: dict[str, object] = {"instance": entity.instance, "class_name": entity.class_name}
+        own = names[entity.instance]
+        fields: dict[str, object] = {
+            "instance": entity.instance,
+            "class_name": entity.class_name,
+            "names": dict(own.shares),
+            "seen": own.looks,
+            "said": own.said,
+            "colors": colors[number],
+        }
         if not classes.by_name(entity.class_name).is_layout:
             fields["box"] = boxes.setdefault(number, minimum_box(surfaces[number]))
         named_regions.append(region.model_copy(update=fields))

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
-from scenewright.schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.language_map import Answer, Answers, AnswersFile, LanguageMap
 from scenewright.stages.kit.formats.map_files import write_arrays
 from scenewright.stages.kit.open_words.encoder import check_width, checked_text
 from scenewright.stages.kit.open_words.finding import Finder, Found
 from scenewright.stages.kit.open_words.opening import open_encoder
-from scenewright.stages.kit.open_words.relations import split_relation
+from scenewright.stages.kit.open_words.reading.phrase import Phrase, read_phrase
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.splat.parameters import QueryParameters
 
@@ -35,18 +35,21 @@ def run(
     check_width(encoder, info.width, info.encoder, str(language.root))
     finder = Finder(language, encoder)
     graph = contact_graph.info if contact_graph is not None else None
-    relation = split_relation(text) if graph is not None else None
-    if graph is not None and relation is not None:
+    phrase = _read(text, context)
+    parts: tuple[str, ...] = (text,)
+    relation = ""
+    if graph is not None and phrase is not None and phrase.other is not None:
         _check_same_map(language, graph)
-        ranking = finder.find_related(relation, graph)
+        ranking = finder.find_related(phrase, graph)
+        parts = (phrase.thing(), phrase.other.thing())
+        relation = f" {phrase.relation} ".join(parts)
     else:
-        ranking = finder.find(text)
+        ranking = finder.find(text, phrase)
     nodes = {node.instance: node.id for node in graph.nodes if node.instance} if graph is not None else {}
     least = parameters.least_probability
     likely = [answer for answer in ranking if answer.probability >= least][: parameters.most]
     below = next((answer for answer in ranking if answer.probability < least), None)
     masks = [finder.index.members(answer.region) for answer in likely]
-    parts = (text,) if relation is None else (relation[0], relation[2])
     unread = tuple(word for part in parts for word in encoder.unread(part))
     AnswersFile(
         text=text,
@@ -55,8 +58,9 @@ def run(
         recognised=None if finder.recognised is None else round(finder.recognised, 4),
         strange=finder.is_strange,
         least_probability=least,
+        understood="" if phrase is None else phrase.said(),
         unread=unread,
-        relation=" ".join(relation) if relation is not None else "",
+        relation=relation,
         answers=tuple(_answer(finder, answer, nodes) for answer in likely),
         next_best=None if below is None else _answer(finder, below, nodes),
     ).write(context.output / "answers.json")
@@ -67,7 +71,7 @@ def run(
     if likely:
         summary["best"] = round(likely[0].probability, 3)
         summary["place"] = [round(float(v), 3) for v in finder.place(likely[0].region)]
-    if finder.is_strange:
+    if finder.is_strange and not finder.by_names:
         context.logger.warning(
             "its images are near nothing that the encoder has learned (%.2f, known from %.2f on): "
             "answers %s; a map made with another --encoder may tell more",
@@ -76,12 +80,25 @@ def run(
             "are guesses" if likely else "would be guesses, which --least-probability 0 shows",
         )
         summary["strange"] = True
-    if unread:
+    if likely and likely[0].doubtful:
+        context.logger.warning("the first answer rests on one doubtful name: look before you trust it")
+    if unread and not finder.by_names:
         found_for_it = "what is found for it is a guess" if likely else "whether it is there is unknown"
         context.logger.warning("the encoder has never read %s: %s", ", ".join(unread), found_for_it)
         summary["unread"] = " ".join(unread)
     none = "unknown" if finder.cannot_tell(*parts) else "absent"
     return Answers(context.output, outcome="ok" if likely else none, summary=summary)
+
+
+def _read(text: str, context: Context) -> Phrase | None:
+    """Return what a text is read as, and say so in a line; None where only the encoder may understand it."""
+    try:
+        phrase = read_phrase(text)
+    except UsageError as error:
+        context.logger.warning("%s; the encoder is asked all the same", error.message)
+        return None
+    context.logger.info("%s", phrase.said())
+    return phrase
 
 
 def _check_same_map(language: LanguageMap, graph: ContactGraphFile) -> None:
@@ -106,6 +123,7 @@ def _answer(finder: Finder, found: Found, nodes: dict[int, str]) -> Answer:
         instance=region.instance,
         node=nodes.get(region.instance, ""),
         other=nodes.get(found.other, ""),
+        doubtful=found.doubtful,
         place=(x, y, z),
         box=region.box,
         gaussians=len(finder.index.members(found.region)),

@@ -35,7 +35,7 @@ window.addEventListener("scenewright-ready", function () {
     for (const place of told.answers) {
       const color = likely(place.probability);
       for (const pair of EDGES) for (const k of pair) { points.push(...place.corners.slice(3 * k, 3 * k + 3)); colors.push(...color); }
-      const row = made("li"), button = made("button", `${place.probability.toFixed(2)} ${place.name} at ${place.center.map((v) => v.toFixed(2)).join(", ")} m`);
+      const row = made("li"), button = made("button", `${place.probability.toFixed(2)} ${place.name} at ${place.center.map((v) => v.toFixed(2)).join(", ")} m${place.doubtful ? ", by one doubtful name" : ""}`);
       button.type = "button";
       button.addEventListener("click", () => { state.target = [...place.center]; state.eye[2] = Math.min(state.eye[2], 2.5); remember(); draw(); });
       row.append(button);
@@ -44,7 +44,8 @@ window.addEventListener("scenewright-ready", function () {
     fill(frames, new Float32Array(points), new Uint8Array(colors));
     const words = [told.answers.length ? `${told.answers.length} of “${told.text}”` : told.unknown ? `Whether the room has “${told.text}” is unknown.` : `The room has no “${told.text}”.`];
     if (!told.answers.length && told.next_best) words.push(`Nearest: ${told.next_best.probability.toFixed(2)} at ${told.next_best.center.map((v) => v.toFixed(2)).join(", ")} m.`);
-    if (told.unread.length) words.push(`Never read: ${told.unread.join(", ")}.`);
+    if (told.understood) words.push(`${told.understood}.`);
+    else if (told.unread.length) words.push(`Never read: ${told.unread.join(", ")}.`);
     if (told.strange) words.push("The encoder has learned no pictures like these: hardly anything is believed.");
     if (!told.calibrated) words.push("Not calibrated: numbers are relevancies.");
     words.push(`${told.milliseconds} ms`);

@@ -11,7 +11,7 @@ from scenewright.schemas.errors import UsageError
 from scenewright.schemas.language_map import LanguageMap
 from scenewright.stages.kit.geometry.boxes import box_corners
 from scenewright.stages.kit.open_words.encoder import checked_text
-from scenewright.stages.kit.open_words.finding import Finder, Found
+from scenewright.stages.kit.open_words.finding import Finder, Found, heard
 from scenewright.stages.kit.open_words.opening import open_encoder
 from scenewright.stages.kit.open_words.options import EncoderParameters
 
@@ -50,19 +50,20 @@ class Asking:
                     hint="scenewright splat query --encoder ...",
                 )
             self._finder = Finder(self.language, encoder)
-        began, finder = time.perf_counter(), self._finder
-        fits, ranking = finder.fits(text), finder.find(text)
+        began, finder, phrase = time.perf_counter(), self._finder, heard(text)
+        fits, ranking = finder.fits(text, phrase), finder.find(text, phrase)
         seconds = time.perf_counter() - began
         answers = [candidate for candidate in ranking if candidate.probability >= LEAST][:MOST]
         below = next((candidate for candidate in ranking if candidate.probability < LEAST), None)
         return {
             "text": text,
+            "understood": "" if phrase is None or not finder.by_names else phrase.said(),
             "answers": [self._place(candidate) for candidate in answers],
             "next_best": None if below is None else self._place(below),
             "unread": list(finder.encoder.unread(text)),
             "unknown": not answers and finder.cannot_tell(text),
             "calibrated": finder.calibration.fitted,
-            "strange": finder.is_strange,
+            "strange": finder.is_strange and not finder.by_names,
             "milliseconds": round(1e3 * seconds, 1),
             **self._warmth(fits.gaussians),
         }
@@ -73,6 +74,7 @@ class Asking:
         return {
             "probability": round(answer.probability, 3),
             "name": f"{region.class_name}_{region.instance}" if region.class_name else "",
+            "doubtful": answer.doubtful,
             "center": [round(value, 3) for value in region.box.center],
             "corners": np.round(box_corners(region.box), 4).ravel().tolist(),
         }

@@ -16,6 +16,7 @@ from scenewright.stages.agent.goals import (
     Shut,
     kind,
 )
+from scenewright.stages.kit.open_words.reading.names import singulars
 
 LONGEST = 2_000
 """Characters of a task."""
@@ -96,14 +97,14 @@ def _things(phrase: str, clean: bool) -> tuple[Description, bool]:
     words = [w for w in words if w not in ("all", "every", "each")]
     color = next((w for w in words if w in COLORS), "")
     name = " ".join(w for w in words if w not in COLORS and w not in ("clean", "unused"))
-    for candidate in (name, name.removesuffix("s"), name.removesuffix("es")):
+    for candidate in singulars(name):
         if candidate in CATEGORIES or candidate in THINGS:
             return kind(candidate, color=color, clean=clean or "clean" in words), every
     raise NotUnderstood(f"I know nothing called {name[:60]!r}")
 
 
 def _furniture(word: str) -> str:
-    for candidate in (word.strip(), word.strip().removesuffix("s"), {"drawer": "dresser"}.get(word.strip(), "")):
+    for candidate in (*singulars(word.strip()), {"drawer": "dresser"}.get(word.strip(), "")):
         if candidate in FURNITURE:
             return candidate
     raise NotUnderstood(f"I know no furniture called {word[:60]!r}")

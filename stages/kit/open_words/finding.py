@@ -6,11 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.contact_graph import ContactGraphFile
-from scenewright.schemas.language_map import LanguageMap, LanguageMapFile
+from scenewright.schemas.errors import UsageError
+from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
 from scenewright.schemas.vocabulary import UNNAMED
 from scenewright.stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
-from scenewright.stages.kit.open_words.calibration import NAMED_SPLAT, Calibration, calibration_of, recognised
+from scenewright.stages.kit.open_words.calibration import NAMED_SPLAT, Calibration, calibration_of, log_odds, recognised
 from scenewright.stages.kit.open_words.encoder import Encoder
+from scenewright.stages.kit.open_words.reading.evidence import Names
+from scenewright.stages.kit.open_words.reading.matching import Match, Thing, is_layout, matches
+from scenewright.stages.kit.open_words.reading.meaning import Meanings
+from scenewright.stages.kit.open_words.reading.phrase import Phrase, read_phrase
 from scenewright.stages.kit.open_words.relations import related
 from scenewright.stages.kit.open_words.relevancy import query_rows
 from scenewright.stages.kit.open_words.vectors import read_vectors
@@ -32,6 +37,17 @@ def class_vectors(info: LanguageMapFile, encoder: Encoder) -> np.ndarray:
     return result
 
 
+def thing_of(region: LanguageRegion) -> Thing:
+    """Return a region as a thing that may be asked for by its names."""
+    return Thing(
+        region.instance,
+        Names(region.names, region.seen, region.said),
+        region.colors,
+        max(region.box.size),
+        bool(region.class_name) and is_layout(region.class_name),
+    )
+
+
 @dataclass(frozen=True)
 class Found:
     """One place."""
@@ -43,16 +59,24 @@ class Found:
     size: float | None
     other: int = 0
     """Instance of what it stands on, in or beside."""
+    doubtful: bool = False
+    """Whether it rests on one doubtful name."""
 
 
 class Finder:
     """A language map with its encoder. Raises BadInput for damaged vectors.
 
     `recognised`: how much of it the encoder knows, None where nothing was fitted for that encoder; `is_strange`: too
-    little, so that hardly anything is believed.
+    little, so that it is not heard where networks named the regions, and hardly believed where none did.
     """
 
-    def __init__(self, language: LanguageMap, encoder: Encoder, calibration: Calibration | None = None) -> None:
+    def __init__(
+        self,
+        language: LanguageMap,
+        encoder: Encoder,
+        calibration: Calibration | None = None,
+        meanings: Meanings | None = None,
+    ) -> None:
         self.info, self.encoder = language.info, encoder
         self.vectors = read_vectors(language)
         self.index = region_index(self.vectors.pieces, self.info)
@@ -62,31 +86,44 @@ class Finder:
         if self.calibration.fitted:
             self.recognised = recognised(self.vectors.regions, self.index.extents, encoder)
         self.is_strange = self.recognised is not None and self.recognised < self.calibration.least_recognised
+        self.has_names = any(region.names for region in self.info.regions)
+        self.meanings = meanings or Meanings()
+        self._things = [thing_of(region) for region in self.info.regions]
 
-    def fits(self, text: str) -> Fits:
-        """Return how well a text fits every region."""
+    @property
+    def by_names(self) -> bool:
+        """Whether names by networks answer: the encoder knows no such pictures, or nobody fitted it."""
+        return self.has_names and (self.is_strange or not self.calibration.fitted)
+
+    def fits(self, text: str, phrase: Phrase | None = None) -> Fits:
+        """Return how well a text fits every region; `phrase`: what it was read as, read here where it is not given."""
+        phrase = (phrase or heard(text)) if self.by_names else None
+        named = np.array([match.probability for match in self._matches(phrase)]) if phrase is not None else None
+        if named is not None and self.is_strange:
+            return Fits(np.zeros(len(named)), None, None, named, self._lit(named))
         fits_of_text = fits(
             self.vectors, self.info, self.index, query_rows(self.encoder, text), self.calibration, self.classes
         )
+        if named is not None:
+            return replace(fits_of_text, probabilities=with_witness(named, fits_of_text.looks))
         believed = self.calibration.strange if self.is_strange else 1.0
         return replace(fits_of_text, probabilities=believed * fits_of_text.probabilities)
 
-    def find(self, text: str) -> list[Found]:
+    def find(self, text: str, phrase: Phrase | None = None) -> list[Found]:
         """Return places, the likeliest first, of which no two are one."""
-        fits_of_text = self.fits(text)
-        return [
-            self._result_of(fits_of_text, region)
-            for region in ranked(self.info, self.index, fits_of_text.probabilities)
-        ]
+        fits_of_text = self.fits(text, phrase)
+        order = ranked(self.info, self.index, fits_of_text.probabilities)
+        return [self._result_of(fits_of_text, region) for region in self._one_an_entity(order)]
 
-    def find_related(self, relation: tuple[str, str, str], graph: ContactGraphFile) -> list[Found]:
+    def find_related(self, phrase: Phrase, graph: ContactGraphFile) -> list[Found]:
         """Return places of the first thing of a relation; the probability of both is the product, and of several others
         the likeliest counts."""
-        first_words, word, of_what = relation
-        first, second = self.fits(first_words), self.fits(of_what)
+        assert phrase.other is not None
+        first = self.fits(phrase.thing(), replace(phrase, relation="", other=None))
+        second = self.fits(phrase.other.thing(), phrase.other)
         number = {region.instance: k for k, region in enumerate(self.info.regions)}
         best: dict[int, tuple[float, int]] = {}
-        for a, b in sorted(related(graph, word)):
+        for a, b in sorted(related(graph, phrase.relation)):
             if a in number and b in number:
                 chance = float(first.probabilities[number[a]] * second.probabilities[number[b]])
                 if chance > best.get(number[a], (0.0, 0))[0]:
@@ -95,8 +132,14 @@ class Finder:
         return [replace(self._result_of(first, k), probability=best[k][0], other=best[k][1]) for k in order]
 
     def cannot_tell(self, *texts: str) -> bool:
-        """Whether the encoder cannot say that a room lacks what texts name: one has a word that it never read and that
-        is in no class of the map, or it has learned no pictures like these."""
+        """Whether nobody can say that a room lacks what texts name: the encoder has learned no pictures like these, or
+        never read a word that is in no class of the map; where names answer, no layer knows a noun."""
+        if self.by_names:
+            phrases = [heard(text) for text in texts]
+            return any(
+                phrase is None or not all(map(self.meanings.knows, phrase.nouns)) or phrase.all_unread()
+                for phrase in phrases
+            )
         in_classes = {word for region in self.info.regions for word in region.class_name.split("_")}
         return self.is_strange or any(set(self.encoder.unread(text)) - in_classes for text in texts)
 
@@ -108,9 +151,48 @@ class Finder:
             return np.array(self.info.regions[region].box.center)
         return points[int(np.linalg.norm(points - np.median(points, axis=0), axis=1).argmin())]
 
+    def _matches(self, phrase: Phrase) -> list[Match]:
+        return matches(phrase, self._things, self.meanings)
+
+    def _lit(self, probabilities: np.ndarray) -> np.ndarray | None:
+        """Return (N,) per Gaussian the probability of its likeliest piece; None without any."""
+        pieces = self.vectors.pieces
+        if not len(self.vectors.means):
+            return None
+        return np.where(pieces >= 0, probabilities[pieces], 0.0).max(axis=0, initial=0.0)
+
+    def _one_an_entity(self, order: list[int]) -> list[int]:
+        """Return regions of which no two are pieces of one entity, where names answer: they all have its name."""
+        if not self.by_names:
+            return order
+        instances = [self.info.regions[k].instance for k in order]
+        return [k for n, k in enumerate(order) if not instances[n] or instances[n] not in instances[:n]]
+
     def _result_of(self, fits_of_text: Fits, region: int) -> Found:
         field, size = None, None
         if fits_of_text.field is not None and fits_of_text.sizes is not None:
             field = float(np.clip(fits_of_text.field[region], 0, 1))
             size = self.info.sizes[int(np.clip(fits_of_text.sizes[region], 0, len(self.info.sizes) - 1))]
-        return Found(region, float(fits_of_text.probabilities[region]), float(fits_of_text.looks[region]), field, size)
+        return Found(
+            region,
+            float(fits_of_text.probabilities[region]),
+            float(fits_of_text.looks[region]),
+            field,
+            size,
+            doubtful=self.by_names and self._things[region].names.is_doubtful(),
+        )
+
+
+def heard(text: str) -> Phrase | None:
+    """Return what a text is read as, None where it is not understood."""
+    try:
+        return read_phrase(text)
+    except UsageError:
+        return None
+
+
+def with_witness(named: np.ndarray, looks: np.ndarray) -> np.ndarray:
+    """Return probabilities (R,) by names (R,) with an encoder that nobody fitted as one more witness: its relevancies
+    (R,) are odds, and one witness changes odds at most as much as it says."""
+    odds = log_odds(named) + np.where(looks > 0, log_odds(looks), 0.0)
+    return 1.0 / (1.0 + np.exp(-odds))

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
+from scenewright.stages.kit.labels import LABEL_TABLES
 from scenewright.stages.kit.services.address import check_address
 from scenewright.stages.kit.stage import NOT_SHOWN, External, Extra, Optionally, Parameters
 
@@ -35,6 +36,17 @@ class EncoderParameters(Parameters):
             return check_address(address, form=ADDRESS_FORM)
         except ValueError as error:
             raise PydanticCustomError(NOT_SHOWN, "{reason}", {"reason": str(error)}) from None
+
+
+READING_FILES = (
+    "words/nouns.txt.gz",
+    "words/anchors.toml",
+    "words/meanings.toml",
+    "words/attributes.toml",
+    "words/wants.toml",
+    *LABEL_TABLES,
+)
+"""Files of data/ that words are read with (`reading/`)."""
 
 
 def encoder_files(parameters: EncoderParameters) -> tuple[str, ...]:

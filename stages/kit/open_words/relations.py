@@ -1,31 +1,9 @@
-"""Words that say where a thing is by another one: "the cup on the desk", answered by the contact graph."""
+"""Where a thing is by another one, answered by the contact graph."""
 
 from __future__ import annotations
 
-import re
-
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.scene_parts import CARRYING
-
-RELATIONS = {
-    "on": r"on top of|standing on|lying on|upon|on",
-    "in": r"inside of|inside|within|in",
-    "under": r"underneath|beneath|below|under",
-    "beside": r"next to|near|beside|close to",
-}
-_PATTERN = re.compile(
-    r"^(?P<first>.+?)\s+(?P<word>" + "|".join(RELATIONS.values()) + r")\s+(?P<second>.+)$", re.IGNORECASE
-)
-
-
-def split_relation(text: str) -> tuple[str, str, str] | None:
-    """Return (what, relation, of what) of a text that says one, else None."""
-    match = _PATTERN.match(text)
-    if match is None:
-        return None
-    word = match["word"].lower()
-    relation = next(name for name, words in RELATIONS.items() if re.fullmatch(words, word))
-    return match["first"], relation, match["second"]
 
 
 def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:

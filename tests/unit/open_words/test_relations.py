@@ -2,26 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import Relation
-from scenewright.stages.kit.open_words.relations import related, split_relation
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("cup on the desk", ("cup", "on", "the desk")),
-        ("red mug next to the white bowl", ("red mug", "beside", "the white bowl")),
-        ("box underneath a table", ("box", "under", "a table")),
-        ("Bottle inside the fridge", ("Bottle", "in", "the fridge")),
-        ("onion", None),
-        ("on the desk", None),
-        ("red mug", None),
-    ],
-)
-def test_relations_are_read(text: str, expected: tuple[str, str, str] | None) -> None:
-    assert split_relation(text) == expected
+from scenewright.stages.kit.open_words.relations import related
 
 
 def test_the_graph_says_which_pairs() -> None:

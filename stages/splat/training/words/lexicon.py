@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scenewright.stages.kit.open_words.reading.colors import COLORS
 from scenewright.stages.kit.open_words.two_towers import words_of
-from scenewright.stages.splat.training.words.colors import COLORS
 
 FILE = Path(__file__).with_name("lexicon.toml")
 DOMINANT, TRACE = 0.5, 0.12

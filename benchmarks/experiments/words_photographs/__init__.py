@@ -1,0 +1,1 @@
+"""Words asked of recorded rooms."""

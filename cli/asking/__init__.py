@@ -1,0 +1,1 @@
+"""`scenewright ask`: what a map or scene answers to words."""

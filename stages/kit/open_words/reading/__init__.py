@@ -1,0 +1,1 @@
+"""One reading of words: a phrase becomes classes, attributes, relations and wants."""
