@@ -181,8 +181,8 @@ def test_nearest_wall_wins_whatever_the_order(build_graph):
     far = build_graph(
         {**meshes, 3: box_mesh((0.0, 0, 1.4), (0.3, 0.6, 1.9))}, {1: "wall", 2: "wall", 3: "wall_cabinet"}
     )
-    assert parents(far)["wall_cabinet_3"] == ("scene", "supports")
-    assert far.parent_link("wall_cabinet_3").confidence < 0.1
+    assert parents(far)["wall_cabinet_3"] == ("scene", "unknown")
+    assert far.parent_link("wall_cabinet_3").because
 
 
 def test_stray_vertices_do_not_stretch_the_box(build_graph):
@@ -198,7 +198,8 @@ def test_stray_vertices_do_not_stretch_the_box(build_graph):
 def test_missing_floor_is_supposed_only_where_the_map_shows_one(build_graph, tmp_path):
     meshes = {2: box_mesh((-0.2, -0.2, 0), (0.2, 0.2, 0.9))}
     graph = build_graph(meshes, {2: "chair"})
-    assert parents(graph) == {"chair_2": ("scene", "supports")} and build_graph.summary["floor"] == "none"
+    assert parents(graph) == {"chair_2": ("scene", "unknown")} and build_graph.summary["floor"] == "none"
+    assert build_graph.summary["unknown"] == 1
 
     # The same with a floor in the whole mesh that no entity owns.
     from scenewright.stages.graph.parameters import GraphParameters

@@ -129,6 +129,8 @@ def test_what_nothing_is_known_to_carry_is_held_and_says_why(tmp_path: Path) -> 
     held = next(body for body in made.info.bodies if body.name == "thing_2")
     assert not held.movable and held.parent is None and held.relation == "unknown"
     assert held.because == "held: nothing is known to carry it: the floor is far below"
+    said = [(doubt.name, doubt.says) for doubt in made.info.doubts]
+    assert ("thing_2", held.because) in said and {name for name, _ in said} == {"thing_2", "scene"}
 
 
 def test_a_chair_without_a_model_is_a_body_of_pieces_that_stands(tmp_path: Path) -> None:
