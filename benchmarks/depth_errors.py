@@ -102,7 +102,7 @@ def bias(frames: Sequence[Frame], camera: Camera) -> float | None:
             assert first.depth is not None and second.depth is not None
             assert first.world_from_camera is not None and second.world_from_camera is not None
             valid = (first.depth > 0)[::STRIDE, ::STRIDE]
-            points = back_project(first.depth, camera)[::STRIDE, ::STRIDE][valid]
+            points = back_project(first.depth, camera, stride=STRIDE)[valid]
             moved = apply(inverse(second.world_from_camera) @ first.world_from_camera, points)
             pixels, z = project(moved, camera)
             inside = np.isfinite(pixels).all(axis=1)

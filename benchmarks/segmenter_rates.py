@@ -209,7 +209,7 @@ def frames_of(
             geometric = segment_depth(frame.depth, camera, geometric_settings(parameters))
             masks = segment(frame, geometric, np.random.default_rng(0))
             valid = (frame.depth > 0)[::STRIDE, ::STRIDE]
-            points = apply(frame.world_from_camera, back_project(frame.depth, camera)[::STRIDE, ::STRIDE][valid])
+            points = apply(frame.world_from_camera, back_project(frame.depth, camera, stride=STRIDE)[valid])
             _, owner = instances_of(told, points, np.zeros(len(points), np.int64), None, 0.0)
             ids = masks.ids[::STRIDE, ::STRIDE][valid]
             present = {int(k): classes[masks.masks[int(k)].class_id] for k in np.unique(ids) if int(k) in masks.masks}

@@ -168,10 +168,47 @@ class CadSceneFile(Model):
     """Surface so near is explained [m]: 2 cm and as much as depth spreads about planes of the map."""
 
 
+class ShellHinge(Model):
+    """How a door of the shell turns about one of its upright edges."""
+
+    at_left: bool
+    """About its left edge, seen from the room; else about the right one."""
+    angle: float
+    """At which it was seen, positive into the room; 0 is shut [rad]."""
+    because: str
+    """Why there: seen, or inferred."""
+
+
+class ShellPanel(Model):
+    """A plate of the room's shell: wall, floor or ceiling, behind its face towards the room, with its holes."""
+
+    node: Name
+    """The layout node that it is of; `shell/<node>.ply` is the closed surface of all plates of a node."""
+    world_from_panel: Transform
+    """x along the face, y across it (of a wall up), z into the room; the face is at z = 0."""
+    thickness: float
+    """[m], away from the room."""
+    boxes: tuple[tuple[float, float, float, float], ...]
+    """What is full of it: left, low, right, top in x and y [m]."""
+    open_area: float
+    """Of its holes [m²]: where cameras looked through, or a door or window has its own node."""
+    seen: float
+    """Share of its full face that was seen; the rest is inferred, as far as the walls beside it, floor and ceiling."""
+    hinge: ShellHinge | None = Field(default=None, exclude_if=lambda hinge: hinge is None)
+    """Of a door: the plate is where it would be shut. Absent for what does not turn."""
+
+
+class ShellFile(Model):
+    """shell.json: the plates that close the room."""
+
+    panels: tuple[ShellPanel, ...]
+
+
 class CadScene(Artifact):
     """`scene.json`, `graph.json` (cg': the contact graph with model, pose, scale, joints per node, boxes and
     planes of the CAD models), `models/<id>/` (copies of the chosen library models), `meshes/<node>.ply` (nodes
-    that keep their mesh), `layout/<node>.ply`, `meshes/surroundings.ply` (what the map shows and
+    that keep their mesh), `layout/<node>.ply`, `shell.json` and `shell/<node>.ply` (the plates that floor, walls and
+    ceiling are, closed; absent where the map tells no layout), `meshes/surroundings.ply` (what the map shows and
     has no name; absent when there is nothing), `unexplained.ply` (what the map shows and nothing in the scene lies
     near to; absent when there is nothing), `edits.json` (what became of each edit, where people put it right)."""
 
@@ -179,4 +216,5 @@ class CadScene(Artifact):
     description: ClassVar[str] = "CAD replacement: model, pose, scale, errors and alternatives per node"
     info = Document(CadSceneFile, "scene.json")
     graph = Document(ContactGraphFile, "graph.json")
+    shell = OptionalDocument(ShellFile, "shell.json")
     edits = OptionalDocument(AppliedEditsFile, "edits.json")

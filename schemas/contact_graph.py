@@ -59,6 +59,8 @@ class ContactGraphFile(Model):
                 raise ValueError(f"{link.source!r:.60} {link.relation} {link.target!r:.60}: no such node")
             if link.plane is not None and not 0 <= link.plane < len(nodes[link.source].planes):
                 raise ValueError(f"{link.source} {link.relation} {link.target}: it has no plane {link.plane}")
+            if link.relation == "unknown" and link.source != SCENE_NODE:
+                raise ValueError(f"{link.source} unknown {link.target}: such a relation comes from {SCENE_NODE!r}")
         self._check_tree()
 
     def _check_tree(self) -> None:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydantic import Field
 from scenewright.schemas.artifact import Artifact, Document, OptionalDocument
-from scenewright.schemas.base import Model, Name, RelativePath, Transform
+from scenewright.schemas.base import Model, Name, RelativePath, Transform, Vector3
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.scene_parts import Box, Joint
 
@@ -26,6 +26,7 @@ class SceneBody(Model):
     """`bodies/<name>.urdf` for movable bodies, None for those in static.urdf."""
     parent: str | None = None
     relation: str = "supports"
+    """To its parent; `unknown`: nothing is known to carry it, and `because` says why."""
     world_from_body: Transform
     world_from_reconstructed: Transform | None = Field(None, exclude_if=lambda pose: pose is None)
     """Where the body frame was before physics laid the body down, when that changed its pose. Absent otherwise."""
@@ -57,6 +58,22 @@ class Spawn(Model):
     """Nothing stands nearer than this [m]."""
 
 
+class Light(Model):
+    """The lamp that lights the scene in simulators; it is assumed, as maps show no lamps."""
+
+    position: Vector3
+    """World frame [m]."""
+
+
+class Doubt(Model):
+    """Something that nobody should trust."""
+
+    name: Name
+    """Of a body, or `scene`."""
+    says: str
+    """What, and why."""
+
+
 class InteractiveSceneFile(Model):
     """scene.json: how to load the scene. Physics engines that know no floating joints load `static_file` with a
     fixed base and then each movable body at world_from_body."""
@@ -66,6 +83,10 @@ class InteractiveSceneFile(Model):
     bodies: tuple[SceneBody, ...]
     spawn: Spawn | None = Field(default=None, exclude_if=lambda place: place is None)
     """Where a robot has most room on the floor that was seen. Absent where there is none."""
+    light: Light | None = Field(default=None, exclude_if=lambda light: light is None)
+    """Also in MJCF, SDF and USD. Absent in older scenes."""
+    doubts: tuple[Doubt, ...] = Field(default=(), exclude_if=lambda doubts: not doubts)
+    """What of it is inferred, held, hardly explained or assumed. Absent in older scenes and in true ones."""
 
 
 class SettledBody(Model):

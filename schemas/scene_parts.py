@@ -68,9 +68,12 @@ class Joint(Model):
     """Direction of the handle bar, model frame."""
 
 
-TREE_RELATIONS = ("supports", "contains", "carries_on_wall", "hangs_from")
-"""Relations from a parent to its child: every node but the root is the target of one. The others stand beside the tree:
-`also_supports` (a second carrier), `leans_on` (what keeps the target from falling over), `proximal` (undirected)."""
+CARRYING = ("supports", "contains", "carries_on_wall", "hangs_from")
+"""Relations that say what carries the target."""
+TREE_RELATIONS = (*CARRYING, "unknown")
+"""Relations from a parent to its child: every node but the root is the target of one. `unknown` leads from the root to
+what nothing seen carries, and claims no support. The others stand beside the tree: `also_supports` (a second carrier),
+`leans_on` (what keeps the target from falling over), `proximal` (undirected)."""
 
 
 class Relation(Model):
@@ -79,7 +82,9 @@ class Relation(Model):
     source: str
     """Parent for directed relations; either end for `proximal`."""
     target: str
-    relation: Literal["supports", "contains", "carries_on_wall", "hangs_from", "also_supports", "leans_on", "proximal"]
+    relation: Literal[
+        "supports", "contains", "carries_on_wall", "hangs_from", "unknown", "also_supports", "leans_on", "proximal"
+    ]
     confidence: float
     plane: int | None = None
     """Index into the source's `planes`: the surface that carries, the inner surface that a contained thing stands on,
@@ -95,3 +100,12 @@ class Relation(Model):
     """Where the two meet, world frame [m]: the middle of what they share. Absent where nothing says it."""
     inside: float | None = Field(default=None, exclude_if=lambda value: value is None)
     """`contains`: share of the child's box that lies within the parent's."""
+    because: str = Field(default="", exclude_if=lambda value: not value)
+    """`unknown`: why nothing is said to carry it, as a clause. Absent otherwise."""
+
+    @property
+    def says(self) -> str:
+        """The relation as a clause: `table_2 supports cup_5`."""
+        if self.relation == "unknown":
+            return f"nothing is known to carry {self.target}"
+        return f"{self.source} {self.relation.replace('_', ' ')} {self.target}"

@@ -131,6 +131,19 @@ class Generator:
             chosen = self._made(folder / "lacking", lambda out: self._script("lacking", *given, "--out", out))
         return RoomInputs(log, every, masks, truth, chosen)
 
+    def every_frame(self, name: str) -> RoomInputs:
+        """Return the inputs of a room with masks of every frame of its recording, errors as in the rung `errors`.
+
+        No part of the board. Raises MethodFailed.
+        """
+        rung = RUNGS["errors"]
+        folder, mapped = self.root / "rooms" / name / rung.recording, self.room(name, rung)
+        whole = self._made(folder / "dense", lambda out: self._run("ingest", out, "--log", mapped.log))
+        drawn_by = error_seed(f"{name}/{rung.recording}")
+        told = ("--sequence", whole, "--errors", rung.errors, "--seed", drawn_by)
+        masks = self._made(folder / "masks_all", lambda out: self._script("spoil", *told, "--masks", out))
+        return RoomInputs(mapped.log, 1, masks, mapped.truth, mapped.library)
+
     def _run(self, command: str, out: Path, *words: object) -> None:
         self.method.run(command, out, *words)
 

@@ -86,7 +86,7 @@ def accumulated_cloud(reader: FrameReader) -> tuple[np.ndarray, np.ndarray] | No
     for frame in reader.frames(("color", "depth"), every=every):
         if frame.world_from_camera is None or frame.depth is None or frame.color is None:
             continue
-        camera_points = back_project(frame.depth, reader.cameras[frame.camera_name])[::4, ::4].reshape(-1, 3)
+        camera_points = back_project(frame.depth, reader.cameras[frame.camera_name], stride=4).reshape(-1, 3)
         valid = (camera_points[:, 2] > 0) & (camera_points[:, 2] < CLOUD_DEPTH)
         points.append(apply(frame.world_from_camera, camera_points[valid]))
         colors.append(frame.color[::4, ::4].reshape(-1, 3)[valid])

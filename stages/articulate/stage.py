@@ -105,7 +105,7 @@ class Used:
         cameras = self.reader.cameras
         for frame in prefetched(self.reader.frames(streams=("depth",), every=self.every)):
             pose = frame.world_from_camera if self.poses is None else self.poses[frame.index]
-            if frame.depth is not None and pose is not None and (frame.depth > 0).any():
+            if frame.depth is not None and pose is not None and frame.depth.max() > 0:
                 self.count += 1
                 yield PosedDepth(frame.index, cameras[frame.camera_name], frame.depth, pose)
 
@@ -121,9 +121,9 @@ def grid_of(used: Used, parameters: ArticulateParameters) -> Watched:
     """Return an empty grid around what the frames saw; of no frame at all, one voxel."""
     clouds = [np.zeros((0, 3))]
     for frame in used:
-        near_depth = np.where(frame.depth < parameters.maximum_depth, frame.depth, 0.0)
-        points = back_project(near_depth, frame.camera)[::16, ::16].reshape(-1, 3)
-        clouds.append(apply(frame.world_from_camera, points[points[:, 2] > NEAREST]))
+        points = back_project(frame.depth, frame.camera, stride=16).reshape(-1, 3)
+        used_points = points[(points[:, 2] > NEAREST) & (points[:, 2] < parameters.maximum_depth)]
+        clouds.append(apply(frame.world_from_camera, used_points))
     points = np.concatenate(clouds)
     if not len(points):
         return Watched(np.zeros(3), parameters.voxel_size, (1, 1, 1))
@@ -199,6 +199,8 @@ def gather(used: Used, grid: Watched, regions: list[Regions], parameters: Articu
     around = np.ones((3, 3, 3), dtype=bool)
     number = [np.asarray(ndimage.grey_dilation(region.number, footprint=around)) for region in regions]
     went, came = regions
+    if not went.count and not came.count:
+        return [[], []]
     until = ndimage.grey_dilation(np.where(went.number > 0, went.changes[..., 0], -1), footprint=around)
     since = ndimage.grey_erosion(np.where(came.number > 0, came.changes[..., 1], NEVER), footprint=around)
     rows_of_region: list[list[list[np.ndarray]]] = [[[] for _ in range(region.count)] for region in regions]

@@ -21,6 +21,8 @@ NOISE = 0.005
 """Depth is trusted within the voxel's half diagonal and this times its square [m]: three deviations of a Kinect."""
 EDGE = 5
 """A voxel is empty only where all depth in a window of so many pixels is behind it: edges of things flicker."""
+NEAREST_VOXEL = 0.2
+"""Voxels whose middle is nearer to the camera are not asked [m]; by eye."""
 MOST_FLIPS = 3
 """Voxels that change oftener say nothing."""
 
@@ -103,6 +105,40 @@ class Watched:
         return is_moved
 
 
+@compiled
+def _in_sight(
+    steps: np.ndarray, shift: np.ndarray, intrinsics: np.ndarray, height: int, width: int, i: int, j: int, count: int
+) -> tuple[int, int]:
+    """Return from and to which of the `count` voxels of a row (i, j) any can lie in the image, one more at either end.
+
+    Along a row depth and pixel times depth are linear, and so is each border of the image.
+    """
+    fx, fy, cx, cy = intrinsics
+    x, y, z = (
+        shift[0] + steps[0, 0] * i + steps[0, 1] * j,
+        shift[1] + steps[1, 0] * i + steps[1, 1] * j,
+        shift[2] + steps[2, 0] * i + steps[2, 1] * j,
+    )
+    dx, dy, dz = steps[0, 2], steps[1, 2], steps[2, 2]
+    start, end = 0, count
+    for value, slope in (
+        (z - NEAREST_VOXEL, dz),
+        (fx * x + (cx + 0.5) * z, fx * dx + (cx + 0.5) * dz),
+        ((width - cx - 0.5) * z - fx * x, (width - cx - 0.5) * dz - fx * dx),
+        (fy * y + (cy + 0.5) * z, fy * dy + (cy + 0.5) * dz),
+        ((height - cy - 0.5) * z - fy * y, (height - cy - 0.5) * dz - fy * dy),
+    ):
+        if slope == 0.0:
+            end = end if value >= 0.0 else start
+            continue
+        border = min(max(-value / slope, -2.0), count + 2.0)
+        if slope > 0.0:
+            start = max(start, int(np.floor(border)) - 1)
+        else:
+            end = min(end, int(np.ceil(border)) + 2)
+    return start, end
+
+
 @compiled(parallel=True, nogil=True)
 def _vote(  # noqa: PLR0913
     votes: np.ndarray,
@@ -126,9 +162,10 @@ def _vote(  # noqa: PLR0913
     fx, fy, cx, cy = intrinsics
     for i in numba.prange(votes.shape[0]):  # every voxel for itself
         for j in range(votes.shape[1]):
-            for k in range(votes.shape[2]):
+            start, end = _in_sight(steps, shift, intrinsics, height, width, i, j, votes.shape[2])
+            for k in range(start, end):
                 z = shift[2] + steps[2, 0] * i + steps[2, 1] * j + steps[2, 2] * k
-                if z < 0.2:
+                if z < NEAREST_VOXEL:
                     continue
                 u = int(np.floor(fx * (shift[0] + steps[0, 0] * i + steps[0, 1] * j + steps[0, 2] * k) / z + cx + 0.5))
                 if u < 0 or u >= width:

@@ -19,12 +19,14 @@ from scenewright.stages.cad.made_models import is_built_in
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.placing import placed_box
-from scenewright.stages.cad.settling import UNEXPLAINED_GAP
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.target import Surroundings, Target, stands_in_wall, unsupported_children
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.geometry.boxes import bottom
 from scenewright.stages.kit.geometry.convex_solids import Solid, penetration
+
+LARGEST_DROP = 0.05
+"""A built-in that ends farther than this above the bottom of its thing would have to drop to stand [m]; by eye."""
 
 
 def built_in_instead(
@@ -64,7 +66,7 @@ def hovers(placement: Placement, surface: ModelSurface, around: Surroundings) ->
     box = around.node.box
     if around.hangs or box is None:
         return False
-    return bottom(placed_box(placement, surface)) - bottom(box) > UNEXPLAINED_GAP
+    return bottom(placed_box(placement, surface)) - bottom(box) > LARGEST_DROP
 
 
 def yielded(entry: Shortlist) -> Shortlist:

@@ -50,6 +50,16 @@ class CadMethod(Protocol):
         """Whether joints of a model that nothing in the map speaks for are held."""
         ...
 
+    @property
+    def closes_the_room(self) -> bool:
+        """Whether floor, walls and ceiling become closed plates, where the map tells a layout."""
+        ...
+
+    @property
+    def largest_error(self) -> float:
+        """Alignment error at which a model that the arrangement moved is none any more [m]."""
+        ...
+
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
         """Return what the method wants to know of seen empty space."""
         ...

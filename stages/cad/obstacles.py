@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scenewright.schemas.cad_scene import ShellFile
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.mesh_files import read_mesh
@@ -30,13 +31,13 @@ from scipy.spatial import QhullError
 
 
 def obstacles_of(
-    graph: ContactGraphFile, layout_folder: Path, mesh_folder: Path
+    graph: ContactGraphFile, layout_folder: Path, mesh_folder: Path, shell: ShellFile | None = None
 ) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
     """Return node -> convex pieces, vertices (V, 3) and faces (F, 3) in the world, of layout (slabs) and of things that
     keep their mesh: the shapes that they have in the exported scene, or nearly so. The folders hold their meshes,
-    `<node>.ply`, world frame."""
+    `<node>.ply`, world frame; `shell`: plates of the layout, where the map tells them."""
     solids = {}
-    for name, pieces in layout_pieces(graph, layout_folder).items():
+    for name, pieces in layout_pieces(graph, layout_folder, shell).items():
         solids[name] = [_hull(piece.vertices) for piece in pieces]
     carriable = {entry.name for entry in load_vocabulary().classes if entry.movable}
     for node in graph.nodes:

@@ -74,6 +74,16 @@ class Ours:
         """A class name says what such things can do, not that this one does."""
         return True
 
+    @property
+    def closes_the_room(self) -> bool:
+        """As the options say."""
+        return self.parameters.shell
+
+    @property
+    def largest_error(self) -> float:
+        """That of a candidate."""
+        return self.parameters.maximum_alignment_error
+
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
         """What the cameras saw empty, a model must not fill."""
         return load_free_space(panoptic_map)

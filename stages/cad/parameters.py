@@ -102,6 +102,9 @@ class CadParameters(Parameters):
     stretched: bool = Field(
         True, description="ours: stretch a model along its own axes where none has the size of the thing"
     )
+    shell: bool = Field(
+        True, description="ours: close floor, walls and ceiling to a shell with its openings, where the map tells them"
+    )
     surroundings: bool = Field(True, description="ours: keep unlabelled surface of the map as a static body")
     surroundings_clearance: float = Field(
         0.03, ge=0.0, description="Unlabelled surface this near to an entity belongs to its rim [m]"

@@ -11,9 +11,9 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.arranging import Arrangement, shifted_box
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.conflicts import Selection
-from scenewright.stages.cad.explaining import Explanation
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.placing import placed_box, placed_planes
+from scenewright.stages.cad.scene_explanation import Explanation
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.stretching import source_of
 from scenewright.stages.kit.formats.mobility import mobility

@@ -14,8 +14,6 @@ from scenewright.stages.kit.geometry.boxes import bottom, footprint
 
 WELL_CARRIED = 0.85
 """Least share of its footprint with which a thing stays where it stands; with less it is moved onto the surface."""
-UNEXPLAINED_GAP = 0.05
-"""A refined box that ends farther than this from its plane was not put on it by the graph [m]."""
 
 
 def tree_order(graph: ContactGraphFile) -> list[str]:
@@ -78,9 +76,6 @@ def stand_on(
     elif link.plane is not None:
         plane = graph.node(link.source).planes[link.plane]
         index, height = link.plane, levels.get(link.source, _height_at(plane, np.asarray(box.center[:2])) + rise)
-        if abs(height - seen_bottom) > UNEXPLAINED_GAP:
-            # The graph found nothing that this stands on and named the floor for want of a better.
-            index, height = None, seen_bottom
     else:
         index, height = None, seen_bottom
     relation = link.model_copy(update={"plane": index, "gap": float(bottom(box) - height)})

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scenewright.schemas.articulations import Articulation, Articulations
 from scenewright.schemas.cad_library import CadLibrary
-from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadScene, JointEvidence
+from scenewright.schemas.cad_scene import SURROUNDINGS, UNEXPLAINED, CadScene, JointEvidence, ShellFile
 from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
 from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.panoptic_map import PanopticMap
@@ -23,8 +23,9 @@ from scenewright.stages.cad.coloring import part_colors
 from scenewright.stages.cad.completing import completed, hulls_of
 from scenewright.stages.cad.conflicts import placed_pieces
 from scenewright.stages.cad.explained import shares_of
-from scenewright.stages.cad.explaining import explanation_of
 from scenewright.stages.cad.families.stand_in import inferred_of
+from scenewright.stages.cad.free_space import FreeSpace
+from scenewright.stages.cad.giving_back import given_back, moved_off
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
 from scenewright.stages.cad.made_models import is_built_in, is_of_family
 from scenewright.stages.cad.method import CadMethod
@@ -34,16 +35,18 @@ from scenewright.stages.cad.ours import Ours
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.recognition import named_by_people, renamed
 from scenewright.stages.cad.records import cad_graph, scene_file
+from scenewright.stages.cad.scene_explanation import explanation_of
 from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.cad.shell import drawn, shell_file, shell_of
 from scenewright.stages.cad.stretching import source_of, write_stretched
-from scenewright.stages.cad.surroundings import footing
+from scenewright.stages.cad.surroundings import Piece, footing
 from scenewright.stages.cad.surroundings_files import rounded_area, surroundings_of, write_surface
 from scenewright.stages.cad.target import Surroundings, Target
 from scenewright.stages.cad.thesis import Thesis
 from scenewright.stages.cad.tries import Thing, load_surfaces, sought
 from scenewright.stages.kit.formats.cad_models import model_folder
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
-from scenewright.stages.kit.geometry.convex_solids import convex_solid
+from scenewright.stages.kit.geometry.convex_solids import Solid, convex_solid
 from scenewright.stages.kit.geometry.point_clouds import sample_large_triangles, vertex_normals
 from scenewright.stages.kit.stage import Context
 
@@ -89,20 +92,23 @@ def choose_and_write(
     """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4). `moved`: what the log
     shows in two states."""
     graph = renamed(graph, shortlists)
+    free_space = method.free_space(panoptic_map)
+    with context.progress.step("shell"):
+        shell = write_shell(graph, panoptic_map, free_space, context) if method.closes_the_room else None
     with context.progress.step("global check"):
         chosen, selection = select(graph, shortlists, surfaces, method, context.random(CONFLICTS))
-        copy_meshes(graph, chosen, panoptic_map, context)
-        layout = context.output / "layout"
-        obstacles = obstacles_of(graph, layout, context.output / "meshes")
-        solids = {name: convex_solid(pieces) for name, pieces in obstacles.items()}
+        obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
         if yielding := colliding_built_ins(graph, chosen, surfaces, solids, method.parameters):
             chosen = {name: placement for name, placement in chosen.items() if name not in yielding}
             shortlists = {name: yielded(entry) if name in yielding else entry for name, entry in shortlists.items()}
-            copy_meshes(graph, chosen, panoptic_map, context)
-            obstacles = obstacles_of(graph, layout, context.output / "meshes")
-            solids = {name: convex_solid(pieces) for name, pieces in obstacles.items()}
-        levels = floor_levels(graph, layout)
+            obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
+        levels = floor_levels(graph, context.output / "layout")
         arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
+        while off := moved_off(graph, panoptic_map, arranged, chosen, surfaces, method.largest_error):
+            chosen = {name: placement for name, placement in chosen.items() if name not in off}
+            shortlists |= {name: given_back(shortlists[name], why) for name, why in off.items()}
+            obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
+            arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         move_meshes(arranged, context.output / "meshes")
     built = [name for name, placement in arranged.placements.items() if is_built_in(placement.shape.model)]
     nameless: EntityMesh | None = None
@@ -113,7 +119,6 @@ def choose_and_write(
     }
     standing |= {name: placed_pieces(p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items()}
     with context.progress.step("complete what would not stand"):
-        free_space = method.free_space(panoptic_map)
         inferred = completed(final, context.output / "meshes", standing, levels, arranged.shifts, free_space)
     if method.keeps_surroundings:
         with context.progress.step("surroundings"):
@@ -243,6 +248,38 @@ def copy_meshes(graph: ContactGraphFile, chosen: Collection[str], panoptic_map: 
         if not source.is_file():
             raise BadInput(f"{source}: mesh of node {node.id} is missing", hint="make the panoptic map again")
         shutil.copyfile(source, folder / f"{node.id}.ply")
+
+
+def write_shell(
+    graph: ContactGraphFile, panoptic_map: PanopticMap, free_space: FreeSpace, context: Context
+) -> ShellFile | None:
+    """Write the plates that close the room (shell.json, shell/<node>.ply) and return them; None without a layout."""
+    if panoptic_map.layout is None:
+        return None
+    bounds = [node for node in graph.nodes if node.node_type == "layout" and node.mesh is not None]
+    meshes = {node.id: load_entity_mesh(panoptic_map.path(str(node.mesh))) for node in bounds}
+    panels = shell_of(graph, panoptic_map.layout, meshes, free_space)
+    for name, mesh in meshes.items():
+        own = [panel for panel in panels if panel.node == name]
+        if own:
+            write_surface(drawn(own, mesh), context.output / "shell" / f"{name}.ply")
+    shell = shell_file(panels, meshes)
+    shell.write(context.output / "shell.json")
+    return shell
+
+
+def meshes_that_stand(
+    graph: ContactGraphFile,
+    chosen: Collection[str],
+    shell: ShellFile | None,
+    panoptic_map: PanopticMap,
+    context: Context,
+) -> tuple[dict[str, list[Piece]], dict[str, Solid]]:
+    """Copy layout and the meshes of what no model was `chosen` for; return their convex pieces, those of the `shell`
+    where there is one, and these as solids."""
+    copy_meshes(graph, chosen, panoptic_map, context)
+    pieces = obstacles_of(graph, context.output / "layout", context.output / "meshes", shell)
+    return pieces, {name: convex_solid(some) for name, some in pieces.items()}
 
 
 def move_meshes(arranged: Arrangement, folder: Path) -> None:

@@ -42,6 +42,16 @@ class Thesis:
         """What the model can do, the thing can."""
         return False
 
+    @property
+    def closes_the_room(self) -> bool:
+        """Layout stays as it was mapped."""
+        return False
+
+    @property
+    def largest_error(self) -> float:
+        """What was chosen stays."""
+        return math.inf
+
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:
         """Seen empty space has no say."""
         return NOTHING_KNOWN

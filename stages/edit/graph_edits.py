@@ -23,6 +23,8 @@ from scenewright.stages.kit.geometry.boxes import (
 from scenewright.stages.kit.geometry.planes import level_plane, plane_height
 
 STANDS = ("supports", "contains")
+PERSON_SAID = "a person said so"
+"""Why the carrier of a thing is unknown, where an edit took it away."""
 LARGEST_EXTENSION = 1.0
 """Boxes are extended down to what carries them by at most this [m], as `graph` does."""
 HIDDEN_WORTH = 0.7
@@ -68,7 +70,7 @@ def support(state: GraphState, edit: Support, fitting: Fitting) -> Done:
         raise Conflict(f"{child.id} is part of the building: nothing carries it")
     before = state.graph.parent_link(child.id)
     if edit.on is None:
-        link = Relation(source=SCENE_NODE, target=child.id, relation="supports", confidence=1.0)
+        link = Relation(source=SCENE_NODE, target=child.id, relation="unknown", confidence=1.0, because=PERSON_SAID)
         parent = None
     else:
         parent = state.graph.nodes[find(edit.on, state, fitting).instance]
@@ -91,7 +93,8 @@ def mark(state: GraphState, edit: Mark, fitting: Fitting) -> Done:
             raise Conflict(f"{node.id} is part of the building: it cannot be free")
         link = state.graph.parent_link(node.id)
         if link is not None and link.relation not in STANDS:
-            raise Conflict(f"{node.id} hangs: it would fall if it were free")
+            what = "nothing is known to carry it" if link.relation == "unknown" else "it hangs"
+            raise Conflict(f"{node.id} cannot be free: {what}, so that it would fall")
     if node.mark == edit.as_:
         return Done("already", (place,), f"it is marked {edit.as_}")
     state.replace_node(node.model_copy(update={"mark": edit.as_}))
@@ -99,7 +102,7 @@ def mark(state: GraphState, edit: Mark, fitting: Fitting) -> Done:
 
 
 def _said(link: Relation) -> str:
-    return "nothing carries it" if link.source == SCENE_NODE else f"{link.source} {link.relation} it"
+    return "nothing known carries it" if link.source == SCENE_NODE else f"{link.source} {link.relation} it"
 
 
 def and_below(graph: ContactGraphFile, name: str) -> set[str]:

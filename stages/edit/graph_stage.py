@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from scenewright.schemas.contact_graph import ContactGraph
-from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.scene_parts import CARRYING
 from scenewright.stages.edit.anchoring import Fitting
 from scenewright.stages.edit.applying import apply_edits
 from scenewright.stages.edit.edits_file import read_edits
@@ -31,6 +31,6 @@ def run(contact_graph: ContactGraph, edits: Path, *, parameters: EditMapParamete
         "nodes": len(state.graph.nodes) - 1,
         "pinned": sum(record.what == "support" and record.status != "conflict" for record in records),
         "marked": sum(node.mark is not None for node in state.graph.nodes),
-        "supports": sum(link.relation in TREE_RELATIONS for link in state.graph.links),
+        "supports": sum(link.relation in CARRYING for link in state.graph.links),
     }
     return ContactGraph(context.output, outcome=outcome_of(records), summary=summary)

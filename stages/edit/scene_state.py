@@ -143,6 +143,9 @@ class SceneState(GraphState):
                     write_ply(target, colored(self.mesh_of(node)))
                 else:
                     shutil.copyfile(file, target)
+        if self.scene.shell is not None:
+            self.scene.shell.write(root / "shell.json")
+            shutil.copytree(self.scene.path("shell"), root / "shell")
         nameless = self.scene.path("meshes") / f"{SURROUNDINGS}.ply"
         if nameless.is_file():
             (root / "meshes").mkdir(parents=True, exist_ok=True)

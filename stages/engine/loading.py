@@ -80,9 +80,10 @@ def payload(artifact: Artifact, name: str) -> Any:
 def as_networkx(graph: ContactGraphFile) -> networkx.MultiDiGraph:
     """Return a networkx.MultiDiGraph: node id -> the fields of GraphNode, edges keyed and attributed by relation.
 
-    `supports`, `contains`, `carries_on_wall` and `hangs_from` go from the carrier to what it carries, and so do
-    `also_supports` and `leans_on`, which stand beside the tree; `proximal` holds both ways and is there once. `box` and
-    `planes` are the models of schemas/scene_parts.py.
+    `supports`, `contains`, `carries_on_wall` and `hangs_from` go from the carrier to what it carries, `unknown` from
+    the scene to what nothing is known to carry, and `also_supports` and `leans_on`, which stand beside the tree, from
+    what helps; `proximal` holds both ways and is there once. `box` and `planes` are the models of
+    schemas/scene_parts.py.
     """
     import networkx
 

@@ -321,4 +321,5 @@ def replacements_of(
         for node, candidate in chosen.items()
         if (shape := placed_candidate(candidate, models)) is not None
     }
-    return RoomReplacements(objects, room_penetrations(placed, layout_pieces(graph, cad_scene.path("layout"))))
+    layout = layout_pieces(graph, cad_scene.path("layout"), cad_scene.shell)
+    return RoomReplacements(objects, room_penetrations(placed, layout))

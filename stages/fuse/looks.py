@@ -16,6 +16,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.schemas.segments import FrameSegment
 from scenewright.stages.fuse.integration import intrinsics_of
 from scenewright.stages.fuse.names import Said
+from scenewright.stages.kit.geometry.cells import row_keys
 from scipy.spatial import cKDTree
 
 SAMPLES = 8000
@@ -98,7 +99,9 @@ class Looks:
         if not len(vertices):
             return [(look.mask, np.zeros(len(look.mask), np.int64)) for look in self.kept]
         ends = np.cumsum([len(look.mask) for look in self.kept])
-        cells, cell_of = np.unique(np.concatenate([look.voxel for look in self.kept]), axis=0, return_inverse=True)
+        voxels = np.concatenate([look.voxel for look in self.kept])
+        _, first, cell_of = np.unique(row_keys(voxels.astype(np.int64)), return_index=True, return_inverse=True)
+        cells = voxels[first]
         near, nearest = cKDTree(vertices).query(
             (cells + 0.5) * self.voxel_size, distance_upper_bound=REACH * self.voxel_size
         )

@@ -16,6 +16,7 @@ from scenewright.stages.fuse.association import (
     measure_overlap,
     overlapping_labels,
 )
+from scenewright.stages.fuse.exposure import Exposure
 from scenewright.stages.fuse.free_space import FreeSpace
 from scenewright.stages.fuse.integration import integrate
 from scenewright.stages.fuse.looks import Looks
@@ -38,6 +39,8 @@ class PanopticMapper:
         self.seen_in: dict[int, int] = {}
         """Frames in which each instance was predicted, as the bits of an integer."""
         self.free_space = FreeSpace() if parameters.merging == "ours" else None
+        is_ours = parameters.merging == "ours"
+        self.exposure = Exposure(np.zeros(3)) if is_ours and parameters.exposure else None
         self.looks = Looks(parameters.voxel_size)
         self.cameras: list[np.ndarray] = []
         """Where the camera was at every frame (3,) [m]."""
@@ -91,6 +94,10 @@ class PanopticMapper:
             raise BadInput(
                 f"camera at {world_from_camera[:3, 3]} m is outside of the voxel grid (+-{reach:.0f} m)",
                 hint="move the origin of the trajectory near the scene",
+            )
+        if self.exposure is not None and color is not None:
+            color = self.exposure.corrected(
+                self.blocks, camera, depth, color, world_from_camera, self.truncation_distance
             )
         index_image, frame_labels = None, np.zeros(1, dtype=np.int32)
         if ids is not None:

@@ -26,6 +26,9 @@ class FuseParameters(Parameters):
     truncation_voxels: float = Field(4.0, ge=1, le=32, description="Truncation distance [voxels]")
     minimum_depth: float = Field(0.1, ge=0.01, description="Minimum depth [m]")
     maximum_depth: float = Field(4.0, gt=0.01, description="Maximum depth [m]")
+    exposure: bool = Field(
+        True, description="ours: take changes of exposure and white balance between frames out of the colours"
+    )
     maximum_weight: float = Field(
         1000.0, gt=0, le=60000, description="Maximum weight of a voxel; older observations fade beyond it"
     )

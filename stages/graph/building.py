@@ -15,6 +15,7 @@ from scenewright.stages.graph.parameters import GraphParameters
 from scenewright.stages.graph.refinement import proximal_relations, register_hidden_planes
 from scenewright.stages.graph.support import Candidate
 from scenewright.stages.graph.tree import choose_parents
+from scenewright.stages.graph.unknown import unknown_support
 from scenewright.stages.kit.geometry.boxes import refined_box
 from scenewright.stages.kit.stage import Context
 
@@ -59,16 +60,14 @@ def contact_graph(entities: list[Entity], chosen: dict[str, Candidate], method: 
     """Put nodes, tree and proximal relations into the file's form; boxes are refined on the way."""
     by_name = {entity.name: entity for entity in entities}
     boxes = {}
+    nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
+    links = []
     for entity in entities:
         candidate = chosen.get(entity.name)
         if candidate is None or candidate.patch is None:
             boxes[entity.name] = entity.box
         else:
             boxes[entity.name] = refined_box(entity.box, candidate.height, method.maximum_extension(entity))
-
-    nodes = [GraphNode(id=SCENE_NODE, instance=0, class_name=SCENE_NODE, node_type="scene")]
-    links = []
-    for entity in entities:
         nodes.append(
             GraphNode(
                 id=entity.name,
@@ -84,8 +83,10 @@ def contact_graph(entities: list[Entity], chosen: dict[str, Candidate], method: 
         )
         if entity.node_type == "layout":
             links.append(Relation(source=SCENE_NODE, target=entity.name, relation="supports", confidence=1.0))
+        elif candidate is not None:
+            links.append(relation_of(candidate, by_name))
         else:
-            links.append(relation_of(chosen[entity.name], by_name))
+            links.append(unknown_support(entity, entities))
     links += method.relations_beside(entities, chosen)
     linked = {(link.source, link.target) for link in links}
     links += proximal_relations(entities, boxes, linked)

@@ -31,19 +31,14 @@ PLANE_DISTANCE = 0.03
 
 
 def relation_of(candidate: Candidate, entities: dict[str, Entity]) -> Relation:
-    """Return the edge of a chosen tree relation with its evidence. `entities`: nodes by name, planes registered.
-
-    A relation that nothing speaks for (an object that floats, given to the floor or the scene) carries no contact.
-    """
+    """Return the edge of a chosen tree relation with its evidence. `entities`: nodes by name, planes registered."""
     relation = Relation(
         source=candidate.parent,
         target=candidate.child,
         relation=candidate.relation,
         confidence=float(min(1.0, max(0.0, candidate.score))),
     )
-    child, parent = entities[candidate.child], entities.get(candidate.parent)
-    if parent is None:
-        return relation
+    child, parent = entities[candidate.child], entities[candidate.parent]
     if candidate.relation == "carries_on_wall":
         return _on_wall(relation, candidate, child, parent)
     if candidate.relation == "hangs_from":

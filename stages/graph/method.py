@@ -33,11 +33,8 @@ class GraphMethod(Protocol):
         ...
 
     def ranked_candidates(self, entities: list[Entity]) -> dict[str, list[Candidate]]:
-        """Return for every object its acceptable relations, best first: support, then wall or ceiling, then floor or
-        scene.
-
-        The last entry always hangs on the scene, so a tree exists whatever the map shows.
-        """
+        """Return for every object its acceptable relations, best first: support, then wall or ceiling. An object
+        without any has an unknown carrier."""
         ...
 
     def maximum_extension(self, entity: Entity) -> float:

@@ -17,7 +17,7 @@ from scenewright.stages.graph.parameters import GraphParameters
 from scenewright.stages.graph.shared_support import PART_SHARE, shared_candidates
 from scenewright.stages.graph.support import Candidate, height_gap
 from scenewright.stages.graph.touching import touches
-from scenewright.stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
+from scenewright.stages.graph.tree import objects_of, upright_layout
 from scenewright.stages.graph.walls import search_trees, wall_candidate
 from scenewright.stages.kit.geometry.boxes import box_volume, boxes_overlap_volume, points_in_box
 from scenewright.stages.kit.geometry.steadiness import stands_steadily
@@ -70,12 +70,11 @@ class Ours:
         return fragments(entities)
 
     def ranked_candidates(self, entities: list[Entity]) -> dict[str, list[Candidate]]:
-        """Return supports (two carriers together where none reaches up), then wall or ceiling, then floor or scene."""
+        """Return supports (two carriers together where none reaches up), then wall or ceiling."""
         parameters = self.parameters
         ceilings = [entity for entity in entities if entity.class_name == "ceiling"]
         walls = [entity for entity in upright_layout(entities) if entity not in ceilings]
         trees = search_trees(walls)
-        floors = level_floors(entities)
         ranked: dict[str, list[Candidate]] = {}
         for child in objects_of(entities):
             choices = candidates_for(child, entities, parameters)
@@ -88,8 +87,7 @@ class Ours:
             wall = wall_candidate(child, walls, reach, trees)
             hanging = hanging_candidate(child, ceilings, reach)
             held_up = [candidate for candidate in (wall, hanging) if candidate is not None]
-            choices += sorted(held_up, key=lambda candidate: -candidate.score)
-            ranked[child.name] = choices + fallback_candidates(child, floors)
+            ranked[child.name] = [*choices, *sorted(held_up, key=lambda candidate: -candidate.score)]
         return ranked
 
     def maximum_extension(self, entity: Entity) -> float:

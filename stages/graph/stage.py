@@ -7,7 +7,6 @@ from dataclasses import replace as dataclass_replace
 
 from scenewright.schemas.contact_graph import ContactGraph
 from scenewright.schemas.panoptic_map import PanopticMap
-from scenewright.schemas.scene_parts import TREE_RELATIONS
 from scenewright.stages.graph.building import build_graph
 from scenewright.stages.graph.entities import Kept
 from scenewright.stages.graph.method import GraphMethod
@@ -56,9 +55,7 @@ def run(panoptic_map: PanopticMap, *, parameters: GraphParameters, context: Cont
         "second_carriers": sum(link.relation == "also_supports" for link in graph.links),
         "leaning": sum(link.relation == "leans_on" for link in graph.links),
         "proximal": sum(link.relation == "proximal" for link in graph.links),
-        "uncertain": sum(
-            link.confidence < parameters.minimum_score for link in graph.links if link.relation in TREE_RELATIONS
-        ),
+        "unknown": sum(link.relation == "unknown" for link in graph.links),
         "hidden_planes": sum(plane.hidden for node in graph.nodes for plane in node.planes),
         "floor": built.floor,
         "dropped": len(built.dropped),

@@ -21,7 +21,7 @@ from scenewright.stages.graph.support import (
     stands_inside,
     support_score,
 )
-from scenewright.stages.graph.tree import fallback_candidates, level_floors, objects_of, upright_layout
+from scenewright.stages.graph.tree import objects_of, upright_layout
 from scenewright.stages.graph.walls import search_trees, wall_candidate
 from scenewright.stages.kit.geometry.boxes import clip_polygon, footprint, transform_points_to_box
 from scenewright.stages.kit.geometry.planes import plane_height
@@ -52,16 +52,14 @@ class Thesis:
         return {}
 
     def ranked_candidates(self, entities: list[Entity]) -> dict[str, list[Candidate]]:
-        """Return supports by (2.3), then the nearest wall, then the floor or the scene. Ceilings count as walls."""
+        """Return supports by (2.3), then the nearest wall. Ceilings count as walls."""
         walls = upright_layout(entities)
         trees = search_trees(walls)
-        floors = level_floors(entities)
         ranked: dict[str, list[Candidate]] = {}
         for child in objects_of(entities):
             wall = wall_candidate(child, walls, self.parameters.wall_distance, trees)
             on_wall = [] if wall is None else [wall]
-            supports = candidates_for(child, entities, self.parameters)
-            ranked[child.name] = [*supports, *on_wall, *fallback_candidates(child, floors)]
+            ranked[child.name] = [*candidates_for(child, entities, self.parameters), *on_wall]
         return ranked
 
     def maximum_extension(self, entity: Entity) -> float:

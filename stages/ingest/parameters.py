@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 from scenewright.schemas.errors import UsageError
@@ -37,7 +37,9 @@ class IngestParameters(Parameters):
         description="How 16-bit depth is stored: as it is, two bytes exchanged, or bits rotated by three (SUN3D)",
     )
     frame_rate: float = Field(30.0, gt=0, description="Frame rate of folders whose images have no time stamps [1/s]")
-    every: int = Field(1, ge=1, description="Use every n-th frame of the log")
+    every: Annotated[int, Field(ge=1)] | Literal["auto"] = Field(
+        1, description="Use every n-th frame of the log; auto: key frames of a posed log, those that add something"
+    )
     start: int = Field(0, ge=0, description="First frame of the log to use")
     stop: int | None = Field(None, ge=0, description="Frame of the log to stop before")
     max_frames: int | None = Field(None, ge=1, description="Stop after this many usable frames")
@@ -97,20 +99,28 @@ def check(parameters: IngestParameters, inputs: Any) -> None:
         raise UsageError(f"stop {parameters.stop} is not after start {parameters.start}", hint="stop later")
 
 
+AUTO = "auto"
+"""Word of `every` for key frames."""
 REPACKED = 1.2
 """Size of a sequence beside its log: 1.0 for MCAP that is packed already, 1.4 for a folder of JPEG and depth PNG."""
 
 
 def _estimate(parameters: IngestParameters, inputs: Inputs) -> Estimate:
     log = inputs["log"]
-    share = 1 / parameters.every
+    share = 1 / parameters.every if isinstance(parameters.every, int) else 1.0
     if log.megapixels is not None and log.frames is not None:
         frames = min(log.frames * share, parameters.max_frames or log.frames)
         megapixels = frames * log.frame_megapixels
         expected = LOG_MEGABYTES_PER_MEGAPIXEL * megapixels
-        return Estimate(expected, 0.3 * expected, 120, frames, megapixels)
+        least = 0.0 if parameters.every == AUTO else 0.3 * expected
+        return Estimate(expected, least, 120, frames, megapixels)
     expected = REPACKED * log.megabytes * share
-    cut = parameters.max_frames is not None or parameters.stop is not None or parameters.start > 0
+    cut = (
+        parameters.every == AUTO
+        or parameters.max_frames is not None
+        or parameters.stop is not None
+        or parameters.start > 0
+    )
     # Raw images shrink to a sixth. A part of the log may be any part of it.
     least = 0.0 if cut else 0.1 * expected
     return Estimate(expected, least, 150, None, expected / LOG_MEGABYTES_PER_MEGAPIXEL)

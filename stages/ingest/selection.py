@@ -31,11 +31,12 @@ def select(
     drops: Counter[str] = Counter()
     last_times: dict[str, int] = {}
     counts: Counter[str] = Counter()
+    every = parameters.every if isinstance(parameters.every, int) else 1
     for entry in entries:
         index = counts[entry.camera_name]
         counts[entry.camera_name] += 1
         stop = len(entries) if parameters.stop is None else parameters.stop
-        if not parameters.start <= index < stop or (index - parameters.start) % parameters.every:
+        if not parameters.start <= index < stop or (index - parameters.start) % every:
             drops[NOT_SELECTED] += 1
             continue
         pose, problem = checked_pose(entry.world_from_camera, has_poses)

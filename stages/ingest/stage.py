@@ -10,14 +10,15 @@ from typing import Any, get_args
 
 import cv2
 import numpy as np
-from scenewright.schemas.errors import BadInput
+from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, SequenceFile, StreamName
 from scenewright.stages.ingest.detection import open_log
 from scenewright.stages.ingest.images import depth_roughness
+from scenewright.stages.ingest.key_frames import key_frames
 from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.origins import named_sources
 from scenewright.stages.ingest.own_poses import with_own_poses
-from scenewright.stages.ingest.parameters import IngestParameters
+from scenewright.stages.ingest.parameters import AUTO, IngestParameters
 from scenewright.stages.ingest.pose_convention_names import CONVENTION_WORDS
 from scenewright.stages.ingest.selection import NOT_SELECTED, largest_step, select
 from scenewright.stages.ingest.source import Entry, LoadedFrame, LogSource, Unusable
@@ -60,6 +61,8 @@ def run(log: Path, trajectory: Path | None = None, *, parameters: IngestParamete
         with context.progress.step("find gravity"):
             gravity = _find_gravity(source, entries, parameters, context)
         context.logger.info("gravity %s: %s", gravity.method, gravity.detail)
+        if parameters.every == AUTO:
+            entries = _key_frames(source, entries, drops, context)
         with context.progress.step("write frames"):
             written = _write_frames(source, entries, gravity, drops, parameters, context)
     finally:
@@ -95,6 +98,21 @@ class _Written:
     def median_depth(self) -> float:
         """Median of the frames' median depths [m], 0 without depth."""
         return float(np.median(self.median_depths)) if self.median_depths else 0.0
+
+
+def _key_frames(source: LogSource, entries: list[Entry], drops: Counter[str], context: Context) -> list[Entry]:
+    """Return the key frames, and count the others. Raises UsageError where frames have no poses."""
+    if any(entry.world_from_camera is None for entry in entries):
+        raise UsageError(
+            "--every auto needs poses, and this log has none",
+            hint="take every n-th frame (--every 5), or give poses of your own (--trajectory)",
+        )
+    cameras = {each.name: each.camera for each in source.cameras}
+    shown = context.progress.track(entries, total=len(entries), description="key frames")
+    chosen = key_frames(shown, cameras)
+    drops[NOT_SELECTED] += len(entries) - len(chosen)
+    context.logger.info("key frames: %d of %d", len(chosen), len(entries))
+    return chosen
 
 
 def check_cameras(source: LogSource, log: Path) -> None:

@@ -64,8 +64,9 @@ def symbolic_state(
     """Return the typed objects and the atoms that hold at the beginning.
 
     Movable bodies are items; bodies with moving parts are containers, each part a door; what has a horizontal plane
-    is a surface. Doors count as open or closed by their joint values; between the two they are neither. Affordances
-    come from regions and grasps (`affordance_atoms`), relations from the contact graph.
+    is a surface, unless nothing is known to carry it: nothing is put there. Doors count as open or closed by their
+    joint values; between the two they are neither. Affordances come from regions and grasps (`affordance_atoms`),
+    relations from the contact graph.
     """
     objects = {START: "spot"}
     atoms: set[Atom] = {("near", START), ("hand_empty",)}
@@ -74,7 +75,7 @@ def symbolic_state(
             objects[name] = "item"
         elif record.joints:
             objects[name] = "container"
-        elif record.class_name in LAYOUT:
+        elif record.class_name in LAYOUT or record.relation == "unknown":
             objects[name] = "support" if record.class_name == "floor" else "thing"
         else:
             objects[name] = "surface"

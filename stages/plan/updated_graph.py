@@ -38,7 +38,7 @@ def update_graph(
             parent, relation = parents[link.target]
             # What was seen of the old place is no evidence of the new one.
             unseen = dict.fromkeys(("plane", "gap", "overlap", "contact", "inside"))
-            changes = {"source": parent, "relation": relation, **unseen}
+            changes = {"source": parent, "relation": relation, "because": "", **unseen}
             links.append(Relation(**{**link.model_dump(), **changes, "confidence": 1.0}))
         else:
             links.append(link)

@@ -87,6 +87,8 @@ def body_rows(scene: InteractiveScene) -> list[BodyRow]:
 
 
 def _place(relation: str, parent: str | None) -> str:
+    if relation == "unknown":
+        return "on nothing known"
     if parent is None or parent == SCENE_NODE:
         return "part of the room"
     word = {"contains": "in", "carries_on_wall": "hangs on", "hangs_from": "hangs from"}.get(relation, "on")

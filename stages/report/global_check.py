@@ -58,7 +58,7 @@ def conflicts_of(
 ) -> list[Penetration]:
     """Return the pairs that are more than 5 mm deep in each other, deepest first."""
     pieces = {node: shelf.pieces(candidate) for node, candidate in candidates.items() if candidate is not None}
-    layout = layout_pieces(cad_scene.graph, cad_scene.path("layout"))
+    layout = layout_pieces(cad_scene.graph, cad_scene.path("layout"), cad_scene.shell)
     return [pair for pair in room_penetrations(pieces, layout) if pair.collides]
 
 

@@ -179,4 +179,4 @@ def _node_title(node: GraphNode) -> str:
 
 
 def _link_title(link: Relation) -> str:
-    return f"{link.source} {link.relation.replace('_', ' ')} {link.target}, {evidence(link)}"
+    return f"{link.says}, {evidence(link)}"

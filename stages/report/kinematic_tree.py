@@ -193,11 +193,7 @@ def _boxes(
 
 def _graph_edges(graph: ContactGraphFile, boxes: Mapping[str, tuple[float, float, float]]) -> tuple[DrawnEdge, ...]:
     return tuple(
-        DrawnEdge(
-            elbow(boxes[link.source], boxes[link.target]),
-            link.relation,
-            f"{link.source} {link.relation.replace('_', ' ')} {link.target}",
-        )
+        DrawnEdge(elbow(boxes[link.source], boxes[link.target]), link.relation, link.says)
         for link in graph.links
         if link.relation in TREE_RELATIONS and link.source in boxes and link.target in boxes
     )

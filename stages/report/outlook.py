@@ -12,7 +12,7 @@ from typing import Any
 
 CLASS_AGNOSTIC = "class-agnostic"
 """Word in the label of masks that have no names."""
-MANY_UNCERTAIN, MANY_MESHES, MANY_LOST = 0.25, 0.5, 0.1
+MANY_UNKNOWN, MANY_MESHES, MANY_LOST = 0.25, 0.5, 0.1
 """Shares of supports, of things without a model, of frames, from which there is something to do about them."""
 HELD_UPRIGHT = "which way is up: no floor was seen, the camera is taken to have been held upright"
 
@@ -122,16 +122,16 @@ def _panoptic_map(facts: Facts) -> Outlook:
 
 
 def _contact_graph(facts: Facts) -> Outlook:
-    objects, uncertain, dropped = (facts.count(name) for name in ("objects", "uncertain", "dropped"))
+    objects, unknown, dropped = (facts.count(name) for name in ("objects", "unknown", "dropped"))
     sound, doubtful, missing, advice = [], [], [], []
     if facts.summary.get("floor") == "seen":
         sound.append("the floor was seen: heights are measured from it")
     elif "floor" in facts.summary:
         missing.append("the floor")
         advice.append("record the floor in front of the furniture too")
-    if uncertain:
-        doubtful.append(f"what {uncertain} of {objects} things stand on")
-    if uncertain > MANY_UNCERTAIN * max(objects, 1):
+    if unknown:
+        doubtful.append(f"what {unknown} of {objects} things stand on")
+    if unknown > MANY_UNKNOWN * max(objects, 1):
         advice.append("come closer to where things touch what carries them")
     if dropped:
         doubtful.append(f"pieces of the map that were too little or too vague to be things and are left out: {dropped}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,9 @@ from scenewright.stages.kit.formats.mobility import NAMELESS, STANDS, Mobility, 
 from scenewright.stages.kit.formats.scene_bundle import BundleBody
 from scenewright.stages.kit.formats.scene_supports import furniture_pieces, support_height
 from scenewright.stages.kit.geometry.boxes import box_from_bounds
+from scenewright.stages.kit.geometry.layout_slabs import Slab
 from scenewright.stages.kit.geometry.steadiness import stands_steadily
+from scenewright.stages.kit.measurement.layout_pieces import plates_of
 
 
 def scene_bodies(
@@ -31,21 +34,35 @@ def scene_bodies(
     Raises BadInput for a missing model or mesh.
     """
     replaced = {entry.node: entry for entry in cad_scene.info.replacements if entry.decision != "layout"}
+    plates = {name: tuple(slabs) for name, slabs in plates_of(cad_scene.shell).items()}
+    panels = () if cad_scene.shell is None else cad_scene.shell.panels
+    doors = {panel.node: (panel, panel.hinge.because) for panel in panels if panel.hinge is not None}
     bodies = [
-        _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id))
+        _body(cad_scene, graph, node, mobility(graph, node, movable, fixed), replaced.get(node.id), plates.get(node.id))
         for node in graph.nodes
         if node.id != SCENE_NODE
     ]
-    bodies = held_under_fixed(bodies)
+    bodies = [
+        replace(body, door=doors[body.name][0], because=f"inferred: a leaf on a hinge; {doors[body.name][1]}")
+        if body.name in doors
+        else body
+        for body in held_under_fixed(bodies)
+    ]
     nameless = cad_scene.path("meshes") / f"{SURROUNDINGS}.ply"
     return [*bodies, _surroundings(nameless)] if nameless.is_file() else bodies
 
 
 def _body(
-    cad_scene: CadScene, graph: ContactGraphFile, node: GraphNode, mobile: Mobility, replacement: Replacement | None
+    cad_scene: CadScene,
+    graph: ContactGraphFile,
+    node: GraphNode,
+    mobile: Mobility,
+    replacement: Replacement | None,
+    plates: tuple[Slab, ...] | None,
 ) -> BundleBody:
     link = graph.parent_link(node.id)
     relation = "supports" if link is None else link.relation
+    held = mobile.why if relation == "unknown" else ""
     parent = None if link is None or link.source == SCENE_NODE else link.source
     added = None if replacement is None else replacement.inferred
     if node.model_id is not None:
@@ -75,12 +92,11 @@ def _body(
             joint_values=dict(node.joints),
             held=frozenset() if replacement is None else replacement.held,
             part_colors={} if replacement is None else dict(replacement.part_colors),
-            because="held: it is built in" if is_built_in else _because(added, ""),
+            because="held: it is built in" if is_built_in else _because(added, held),
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
     inferred = () if added is None else tuple(np.array(corners) for corners in added.pieces)
-    held = ""
     if mobile.furniture and node.mark is None and mesh is not None and not _steady(graph, node, mesh, inferred):
         mobile, held = Mobility(False), "it would not stand" if added is None else added.because
     origin = np.eye(4) if node.node_type == "layout" else _bottom(bounds)
@@ -97,6 +113,7 @@ def _body(
         box=bounds,
         mesh=mesh,
         inferred=tuple(corners - origin[:3, 3] for corners in inferred),
+        slabs=plates,
         because=_because(added, held),
     )
 
@@ -171,12 +188,21 @@ def _bottom(box: Box) -> np.ndarray:
 
 def _mesh(cad_scene: CadScene, node: GraphNode) -> trimesh.Trimesh | None:
     """Return the mesh that stands for a node without model, world frame, or None when there is none."""
-    folder = "layout" if node.node_type == "layout" else "meshes"
-    file: Path = cad_scene.path(folder) / f"{node.id}.ply"
+    folders = ("shell", "layout") if node.node_type == "layout" else ("meshes",)
+    files = [cad_scene.path(folder) / f"{node.id}.ply" for folder in folders]
+    file = next((file for file in files if file.is_file()), files[-1])
     if not file.is_file():
         return None
     mesh = read_mesh(file, may_be_empty=True, hint="run `cad` again")
     return mesh if len(mesh.faces) else None
+
+
+def seen_floors(cad_scene: CadScene) -> list[trimesh.Trimesh]:
+    """Return what was seen of the floors of a scene, world frame."""
+    floors = [node for node in cad_scene.graph.nodes if node.class_name == "floor"]
+    files = [cad_scene.path("layout") / f"{node.id}.ply" for node in floors]
+    meshes = [read_mesh(file, may_be_empty=True, hint="run `cad` again") for file in files if file.is_file()]
+    return [mesh for mesh in meshes if len(mesh.faces)]
 
 
 def _box(node: GraphNode, mesh: trimesh.Trimesh | None, cad_scene: CadScene) -> Box:

@@ -14,10 +14,12 @@ from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
 from scenewright.stages.urdf.standing_place import CELL, roomiest_place
 
 
-def spawn_of(bodies: Sequence[BundleBody]) -> Spawn | None:
-    """Return the place for a robot's base among the bodies of a scene; None without a floor, or where it is full."""
-    floors = [_surface(body) for body in bodies if body.class_name == "floor"]
-    floor = np.concatenate(floors or [np.zeros((0, 3))])
+def spawn_of(bodies: Sequence[BundleBody], floors: Sequence[trimesh.Trimesh]) -> Spawn | None:
+    """Return the place for a robot's base among the bodies of a scene; None without a floor, or where it is full.
+
+    `floors`: what was seen of them, world frame.
+    """
+    floor = np.concatenate([np.zeros((0, 3)), *(_filled(mesh) for mesh in floors)])
     others = [body for body in bodies if not load_vocabulary().by_name(body.class_name).is_layout]
     surface = np.concatenate([_surface(body) for body in others] or [np.zeros((0, 3))])
     place = roomiest_place(floor, [body.box for body in others if body.mesh is None], surface)
@@ -35,5 +37,9 @@ def _surface(body: BundleBody) -> np.ndarray:
     """Return points (N, 3) [m] on a body's own mesh, world frame, in all cells that it covers."""
     if body.mesh is None or not len(body.mesh.faces):
         return np.zeros((0, 3))
-    dense, _ = trimesh.remesh.subdivide_to_size(body.mesh.vertices, body.mesh.faces, max_edge=CELL, max_iter=20)
-    return apply(body.world_from_body, np.asarray(dense, float))
+    return apply(body.world_from_body, _filled(body.mesh))
+
+
+def _filled(mesh: trimesh.Trimesh) -> np.ndarray:
+    dense, _ = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=CELL, max_iter=20)
+    return np.asarray(dense, float)

@@ -14,7 +14,8 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.scene_bundle import BundleBody, write_scene_bundle
 from scenewright.stages.kit.simulation.margins import is_marginal
 from scenewright.stages.kit.stage import Context
-from scenewright.stages.urdf.bodies import scene_bodies
+from scenewright.stages.urdf.bodies import scene_bodies, seen_floors
+from scenewright.stages.urdf.doubts import doubts_of
 from scenewright.stages.urdf.exports import write_exports
 from scenewright.stages.urdf.giving_way import given_way
 from scenewright.stages.urdf.parameters import UrdfParameters
@@ -35,10 +36,10 @@ def run(cad_scene: CadScene, *, parameters: UrdfParameters, context: Context) ->
     with context.progress.step("read the CAD scene"):
         graph = cad_scene.graph
         bodies = scene_bodies(cad_scene, graph, movable, parameters.fixed_classes)
-        spawn = spawn_of(bodies)
+        spawn = spawn_of(bodies, seen_floors(cad_scene))
 
     def write(bodies: list[BundleBody]) -> InteractiveSceneFile:
-        return write_scene_bundle(context.output, bodies, graph, spawn)
+        return write_scene_bundle(context.output, bodies, graph, spawn, doubts_of(cad_scene, bodies))
 
     with context.progress.step("write and check the kinematic tree"):
         scene = write(bodies)

@@ -13,7 +13,7 @@ from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.ground_truth import TrueObject
 from scenewright.schemas.panoptic_map import PanopticMap
-from scenewright.schemas.scene_parts import TREE_RELATIONS, Box
+from scenewright.schemas.scene_parts import CARRYING, Box
 from scenewright.schemas.sequence import Sequence
 from scenewright.stages.evaluate import TrueRoom, load_map
 from scenewright.stages.evaluate.surfaces import Surface
@@ -176,7 +176,7 @@ def supports_agreed(
     """Count supports whatever their relation is called: true ones that are known, and predicted ones of the things
     that they are known of and of the `false` ones. found: true instance -> entity."""
     nodes = {node.instance: node for node in graph.nodes if node.instance}
-    parents = {link.target: graph.node(link.source) for link in graph.links if link.relation in TREE_RELATIONS}
+    parents = {link.target: graph.node(link.source) for link in graph.links if link.relation in CARRYING}
     predicted = {k: parents.get(nodes[found[k]].id) for k in told if k in found and found[k] in nodes}
     agreed = 0
     for k, above in predicted.items():

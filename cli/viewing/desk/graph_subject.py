@@ -45,6 +45,6 @@ class GraphSubject(Subject[GraphState]):
 
     def _facts_of(self, thing: Thing, node: GraphNode) -> dict[str, Any]:
         link = self.state.graph.parent_link(node.id)
-        stands = "" if link is None else f"{link.source} {link.relation.replace('_', ' ')} it"
+        stands = "" if link is None else link.says
         words = [word for word in (stands, node.mark and f"marked {node.mark}", node.model_id) if word]
         return {"box": written_box(thing.box).model_dump(), "says": "; ".join(words)}

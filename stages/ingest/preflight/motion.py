@@ -63,7 +63,7 @@ def shared(first: Look, second: Look, second_from_first: np.ndarray) -> float:
     """Return the share of the valid pixels of `first` that fall into the picture of `second`."""
     assert first.depth is not None
     step = max(1, first.depth.shape[1] // 40)
-    points = back_project(first.depth * np.float32(1e-3), first.depth_camera)[::step, ::step].reshape(-1, 3)
+    points = back_project(first.depth * np.float32(1e-3), first.depth_camera, stride=step).reshape(-1, 3)
     points = points[points[:, 2] > 0].astype(np.float64)
     if not len(points):
         return 0.0

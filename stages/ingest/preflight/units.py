@@ -113,7 +113,7 @@ def room_extent(looks: Sequence[tuple[Look, np.ndarray]]) -> float | None:
     clouds = []
     for look, pose in looks:
         if look.depth is not None:
-            points = back_project(look.depth * np.float32(1e-3), look.depth_camera)[::4, ::4].reshape(-1, 3)
+            points = back_project(look.depth * np.float32(1e-3), look.depth_camera, stride=4).reshape(-1, 3)
             clouds.append(apply(pose, points[points[:, 2] > 0].astype(float)))
     if not clouds or not sum(map(len, clouds)):
         return None

@@ -9,6 +9,7 @@ RELATION_COLORS = {
     "contains": "#c2571a",
     "carries_on_wall": "#7a4fb0",
     "hangs_from": "#2c8f6f",
+    "unknown": "#c9a227",
     "also_supports": "#2f6fb3",
     "leans_on": "#b0487a",
     "proximal": "#8c8c8c",

@@ -33,7 +33,9 @@ def _of(graph: ContactGraphFile, node: GraphNode) -> Iterator[Reason]:
     if node.mark is not None:
         yield Reason(f"A person marked it {node.mark}.", {"mark": node.mark})
     parent = graph.parent_link(node.id)
-    if parent is None or parent.source == SCENE_NODE:
+    if parent is not None and parent.relation == "unknown":
+        yield Reason(f"Nothing is known to carry it: {parent.because}.", parent.model_dump(mode="json"))
+    elif parent is None or parent.source == SCENE_NODE:
         why = "it bounds the room" if node.node_type == "layout" else "no support was found under or behind it"
         yield Reason(f"Nothing carries it: {why}.", {"parent": None, "node_type": node.node_type})
     else:

@@ -12,11 +12,19 @@ from scenewright.stages.kit.geometry.substances import ROLLING_FRICTION, SPINNIN
 from scenewright.stages.kit.geometry.transforms import quaternion_of
 
 KEY_FRAME, SPAWN = "reconstructed", "spawn"
+LAMP_CUTOFF = "85"
+"""Half the cone of the lamp [degrees]: all of the room below it."""
 
 
-def write_mjcf(path: Path, urdf: Urdf, joint_values: dict[str, float], spawn: np.ndarray | None = None) -> None:
+def write_mjcf(
+    path: Path,
+    urdf: Urdf,
+    joint_values: dict[str, float],
+    spawn: np.ndarray | None = None,
+    lamp: tuple[float, ...] = (0.0, 0.0, 3.0),
+) -> None:
     """Write a kinematic tree (root link `world`) as MJCF; mesh paths are relative to `path`. `spawn`: world_from_base
-    (4, 4) of the site `spawn`, to which a robot can be attached.
+    (4, 4) of the site `spawn`, to which a robot can be attached; `lamp`: (3,) where the light hangs [m].
 
     MuJoCo allows free joints only right under the world: children of floating joints go there with their world poses.
     The key frame `reconstructed` holds the given joint values and the poses of the free bodies.
@@ -35,7 +43,8 @@ def write_mjcf(path: Path, urdf: Urdf, joint_values: dict[str, float], spawn: np
         ElementTree.SubElement(ElementTree.SubElement(defaults, "default", {"class": name}), "geom", attributes)
     assets = ElementTree.SubElement(root, "asset")
     world = ElementTree.SubElement(root, "worldbody")
-    ElementTree.SubElement(world, "light", name="lamp", pos="0 0 3", dir="0 0 -1", directional="true")
+    shines = {"dir": "0 0 -1", "cutoff": LAMP_CUTOFF, "exponent": "1", "castshadow": "true"}
+    ElementTree.SubElement(world, "light", {"name": "lamp", "pos": numbers(lamp), **shines})
     if spawn is not None:
         ElementTree.SubElement(world, "site", name=SPAWN, pos=numbers(spawn[:3, 3]), quat=_quaternion(spawn))
     contact = ElementTree.SubElement(root, "contact")

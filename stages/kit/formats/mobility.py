@@ -2,7 +2,7 @@
 
 Free is what stands on something (what hangs would fall) and is either of a class that an arm carries, or furniture: a
 thing, with doors and drawers or without, not built in, which the contact graph puts on a level plane, laden or not.
-What a person marked (`edit mark`) is as they said; what hangs stays.
+What a person marked (`edit mark`) is as they said; what hangs stays, and what nothing is known to carry.
 """
 
 from __future__ import annotations
@@ -61,6 +61,8 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
     link = graph.parent_link(node.id)
     if node.node_type == "layout":
         return Mobility(False, why="it bounds the room")
+    if link is not None and link.relation == "unknown":
+        return Mobility(False, why=f"nothing is known to carry it: {link.because}")
     if link is not None and link.relation not in STANDS:
         return Mobility(False, why="it hangs, and would fall")
     is_carriable = node.class_name in carriable

@@ -10,16 +10,19 @@ import numpy as np
 import trimesh
 from scenewright.schemas.base import as_transform
 from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.cad_scene import ShellPanel
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.schemas.errors import BadInput
-from scenewright.schemas.interactive_scene import InteractiveSceneFile, SceneBody, Spawn
+from scenewright.schemas.interactive_scene import Doubt, InteractiveSceneFile, SceneBody, Spawn
 from scenewright.schemas.scene_parts import Box
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.kit.formats.mjcf_file import write_mjcf
+from scenewright.stages.kit.formats.scene_light import light_of
 from scenewright.stages.kit.formats.scene_links import (
     BodyLinks,
     box_links,
     cut_links,
+    door_links,
     furniture_links,
     layout_links,
     mesh_links,
@@ -77,6 +80,10 @@ class BundleBody:
     """Number of a collision shape of its mesh -> corners (N, 3), body frame, of the convex pieces in its place."""
     inferred: tuple[np.ndarray, ...] = ()
     """Corners (N, 3), body frame [m], of convex pieces that nobody saw, and that its mesh needs to stand."""
+    door: ShellPanel | None = None
+    """A leaf that turns, where it is one."""
+    slabs: tuple[Slab, ...] | None = None
+    """World frame: the boxes that a floor, wall or ceiling is; None: those that its planes tell."""
     because: str = ""
     """What of it is inferred and why, or why it is held."""
 
@@ -86,9 +93,14 @@ class BundleBody:
 
 
 def write_scene_bundle(
-    root: Path, bodies: list[BundleBody], graph: ContactGraphFile, spawn: Spawn | None = None
+    root: Path,
+    bodies: list[BundleBody],
+    graph: ContactGraphFile,
+    spawn: Spawn | None = None,
+    doubts: tuple[Doubt, ...] = (),
 ) -> InteractiveSceneFile:
-    """Write kind interactive_scene into `root` and return what stands in scene.json. `spawn`: a place for a robot.
+    """Write kind interactive_scene into `root` and return what stands in scene.json. `spawn`: a place for a robot;
+    `doubts`: what nobody should trust.
 
     `scene.urdf`: every body hangs on its parent, on a floating joint when it is movable, else on a fixed one; joints
     inside articulated models are kept. `static.urdf`: what is not movable, fixed to the nearest ancestor that is
@@ -121,8 +133,11 @@ def write_scene_bundle(
     for file in checked:
         require_sound(file, root)
     values = {name: value for body_links in links.values() for name, value in (body_links.joint_values or {}).items()}
-    write_mjcf(root / "scene.mjcf.xml", combined, values, None if spawn is None else np.array(spawn.world_from_base))
-    scene = InteractiveSceneFile(bodies=tuple(_record(body, links[body.name]) for body in ordered), spawn=spawn)
+    light = light_of([(body.class_name, body.box) for body in ordered])
+    base = None if spawn is None else np.array(spawn.world_from_base)
+    write_mjcf(root / "scene.mjcf.xml", combined, values, base, lamp=light.position)
+    records = tuple(_record(body, links[body.name]) for body in ordered)
+    scene = InteractiveSceneFile(bodies=records, spawn=spawn, light=light, doubts=doubts)
     scene.write(root / "scene.json")
     graph.write(root / "graph.json")
     return scene
@@ -191,6 +206,8 @@ def _links(
         links = model_links(
             root, body.name, body.model, body.model_folder, body.scale, body.joint_values, body.part_colors, body.held
         )
+    elif body.door is not None:
+        links = door_links(body.name, body.world_from_body, visual, body.door)
     elif load_vocabulary().by_name(body.class_name).is_layout:
         links = layout_links(body.name, body.world_from_body, visual, _slabs(body, node, graph, center))
         return links.with_friction(substance.friction)
@@ -233,6 +250,8 @@ def _mesh_links(
 
 
 def _slabs(body: BundleBody, node: GraphNode | None, graph: ContactGraphFile, center: np.ndarray) -> list[Slab]:
+    if body.slabs is not None:
+        return list(body.slabs)
     planes = () if node is None else node.planes
     in_world = None
     if body.mesh is not None and len(body.mesh.faces):

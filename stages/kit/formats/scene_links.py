@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from scenewright.schemas.cad_library import CadModel
+from scenewright.schemas.cad_scene import ShellPanel
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.scene_parts import Box, Joint
 from scenewright.stages.kit.formats.cad_models import URDF_FILE, load_visual_parts
-from scenewright.stages.kit.formats.model_writer import write_obj
+from scenewright.stages.kit.formats.model_writer import HINGE_DAMPING, HINGE_FRICTION, write_obj
 from scenewright.stages.kit.formats.part_colors import recolored_shapes, vertex_colors
 from scenewright.stages.kit.formats.scene_supports import (
     Carried,
@@ -25,7 +26,7 @@ from scenewright.stages.kit.formats.scene_supports import (
 )
 from scenewright.stages.kit.formats.urdf_file import Link, Shape, UrdfJoint, parse_urdf
 from scenewright.stages.kit.geometry.box_cover import cover_with_boxes
-from scenewright.stages.kit.geometry.layout_slabs import Slab
+from scenewright.stages.kit.geometry.layout_slabs import Slab, slabs_of_panel
 from scenewright.stages.kit.geometry.solids import MassProperties, Solid, box, hull_or_box, mass_properties
 from scenewright.stages.kit.geometry.transforms import (
     inverse,
@@ -35,6 +36,8 @@ from scenewright.stages.kit.geometry.transforms import (
 )
 from scipy.spatial.transform import Rotation
 
+DOOR_DENSITY, OPENS = 400.0, 1.5708
+"""Of a door's leaf [kg/m^3], and how far it opens at least [rad]; by eye."""
 LAYOUT_DENSITY = 1000.0
 """Density of floor, walls and ceiling [kg/m^3]; by eye."""
 GREY = (0.6, 0.6, 0.6, 1.0)
@@ -356,6 +359,42 @@ def layout_links(name: str, world_from_body: np.ndarray, visual: Shape | None, s
     properties = mass_properties(solids, [LAYOUT_DENSITY] * len(solids)) if solids else None
     visuals = tuple(replace(shape, color=GREY) for shape in collisions) if visual is None else (visual,)
     return BodyLinks((Link(name, properties, visuals, tuple(collisions)),))
+
+
+def door_links(name: str, world_from_body: np.ndarray, visual: Shape | None, door: ShellPanel) -> BodyLinks:
+    """Return the links of a door of the shell: one that stays, without a shape, and the leaf, which turns about one of
+    its upright edges. `visual` (None: its box): the shut leaf, body frame."""
+    hinge, slabs = door.hinge, slabs_of_panel(door)
+    assert hinge is not None  # who calls asks first
+    edge = np.eye(4)
+    edge[0, 3] = min(box[0] for box in door.boxes) if hinge.at_left else max(box[2] for box in door.boxes)
+    body_from_leaf = inverse(world_from_body) @ np.array(door.world_from_panel) @ edge
+    leaf_from_body = inverse(body_from_leaf)
+    collisions, solids = [], []
+    for slab in slabs:
+        frame = leaf_from_body @ inverse(world_from_body) @ slab.world_from_slab
+        x, y, z = (float(v) for v in slab.size)
+        collisions.append(Shape(box_size=(x, y, z), link_from_shape=frame))
+        solids.append(box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2)).moved(frame))
+    visuals = [replace(shape, color=GREY) for shape in collisions]
+    if visual is not None:
+        visuals = [replace(visual, link_from_shape=leaf_from_body)]
+    leaf, axis = f"{name}__leaf", (0.0, -1.0 if hinge.at_left else 1.0, 0.0)
+    properties = mass_properties(solids, [DOOR_DENSITY] * len(solids))
+    limits = min(0.0, hinge.angle), max(OPENS, hinge.angle)
+    joint = UrdfJoint(f"{name}__hinge", "revolute", name, leaf, body_from_leaf, axis, *limits)
+    joint = replace(joint, damping=HINGE_DAMPING, friction=HINGE_FRICTION)
+    record = Joint(
+        name=joint.name,
+        type="revolute",
+        part=leaf,
+        origin=_triple(body_from_leaf[:3, 3]),
+        axis=_triple(body_from_leaf[:3, :3] @ np.array(axis)),
+        lower=limits[0],
+        upper=limits[1],
+    )
+    links = (Link(name), Link(leaf, properties, tuple(visuals), tuple(collisions)))
+    return BodyLinks(links, (joint,), (record,), {joint.name: hinge.angle})
 
 
 def own_visual(root: Path, name: str, mesh: trimesh.Trimesh, *, write: bool) -> Shape:

@@ -11,12 +11,15 @@ def intrinsic_matrix(camera: Camera) -> np.ndarray:
     return np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]], dtype=float)
 
 
-def back_project(depth: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return points (H, W, 3) [m] in the camera frame of a z-depth image (H, W) [m]; depth 0 gives the origin."""
+def back_project(depth: np.ndarray, camera: Camera, stride: int = 1) -> np.ndarray:
+    """Return points (H, W, 3) [m] in the camera frame of a z-depth image (H, W) [m]; depth 0 gives the origin.
+
+    With a `stride` every so many rows and columns are taken, the first ones among them.
+    """
     height, width = depth.shape
-    x = (np.arange(width, dtype=np.float32) - np.float32(camera.cx)) / np.float32(camera.fx)
-    y = (np.arange(height, dtype=np.float32) - np.float32(camera.cy)) / np.float32(camera.fy)
-    depth = depth.astype(np.float32)
+    x = (np.arange(0, width, stride, dtype=np.float32) - np.float32(camera.cx)) / np.float32(camera.fx)
+    y = (np.arange(0, height, stride, dtype=np.float32) - np.float32(camera.cy)) / np.float32(camera.fy)
+    depth = depth[::stride, ::stride].astype(np.float32)
     return np.stack([x[None, :] * depth, y[:, None] * depth, depth], axis=-1)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 from scenewright.schemas.base import as_vector
+from scenewright.schemas.cad_scene import ShellPanel
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.scene_parts import Box, SurfacePlane
 from scenewright.stages.kit.geometry.boxes import box_corners, box_rotation
@@ -36,6 +37,16 @@ class Slab:
 
     world_from_slab: np.ndarray
     size: np.ndarray
+
+
+def slabs_of_panel(panel: ShellPanel) -> list[Slab]:
+    """Return what is full of a plate of the shell as boxes in the world."""
+    slabs = []
+    for left, low, right, top in panel.boxes:
+        middle = [0.5 * (left + right), 0.5 * (low + top), -0.5 * panel.thickness]
+        frame = np.array(panel.world_from_panel) @ transform_from(np.eye(3), np.array(middle))
+        slabs.append(Slab(frame, np.array([right - left, top - low, panel.thickness])))
+    return slabs
 
 
 def slabs_of_layout(

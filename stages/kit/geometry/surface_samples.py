@@ -20,7 +20,7 @@ def surface_samples(depth: np.ndarray, camera: Camera, world_from_camera: np.nda
     quantisation and noise of the depth do not dominate; pixels at depth edges are left out.
     """
     stride = max(1, round(STRIDE_ANGLE * camera.fx))
-    points = back_project(depth, camera)[::stride, ::stride].astype(np.float64)
+    points = back_project(depth, camera, stride).astype(np.float64)
     valid = (points[..., 2] > SMALLEST_DEPTH) & (points[..., 2] < LARGEST_DEPTH)
     if min(points.shape[:2]) < 3:
         return np.zeros((0, 3)), np.zeros((0, 3))

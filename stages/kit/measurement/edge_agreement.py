@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from scenewright.schemas.contact_graph import ContactGraphFile
-from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.scene_parts import CARRYING
 
-DIRECTED = TREE_RELATIONS
+DIRECTED = CARRYING
+"""Edges of the tree that claim a support: an `unknown` one counts neither as predicted nor as true."""
 Edge = tuple[str, str, str]
 """Source, target, relation."""
 BESIDE_THE_TREE = ("also_supports", "leans_on", "proximal")
+UNJUDGED = ("proximal", "unknown")
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,8 @@ def edge_errors(
     *,
     ignored: frozenset[str] = frozenset(),
 ) -> tuple[frozenset[Edge], frozenset[Edge]]:
-    """Return the true edges that were not found and the predicted edges that are not true, but for proximal ones.
+    """Return the true edges that were not found and the predicted edges that are not true, but for those that are
+    proximal and those that claim nothing (`unknown`).
 
     `partner`, `ignored` as in `edge_agreement`.
     """
@@ -91,8 +94,8 @@ def edge_errors(
     missing = {edge for edge, matched_edge in matched.items() if matched_edge not in got}
     wrong = got - set(matched.values())
     return (
-        frozenset(edge for edge in missing if edge[2] != "proximal"),
-        frozenset(edge for edge in wrong if edge[2] != "proximal"),
+        frozenset(edge for edge in missing if edge[2] not in UNJUDGED),
+        frozenset(edge for edge in wrong if edge[2] not in UNJUDGED),
     )
 
 

@@ -5,17 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.cad_scene import ShellFile
 from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.stages.kit.formats.mesh_files import read_mesh
-from scenewright.stages.kit.geometry.layout_slabs import Slab, slabs_of_layout
+from scenewright.stages.kit.geometry.layout_slabs import Slab, slabs_of_layout, slabs_of_panel
 from scenewright.stages.kit.measurement.convex_overlap import ConvexPiece, convex_piece
 
 
-def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, list[ConvexPiece]]:
+def layout_pieces(
+    graph: ContactGraphFile, layout_folder: Path, shell: ShellFile | None
+) -> dict[str, list[ConvexPiece]]:
     """Return layout node -> the slabs that it collides with in the exported scene, as convex pieces in the world.
 
-    Made of planes, mesh (`<node>.ply` in `layout_folder`, where there is one) and box, as the scene's files make them.
+    Those of the shell, where it has any of the node; else made of planes, mesh (`<node>.ply` in `layout_folder`, where
+    there is one) and box, as the scene's files make them.
     """
+    plates = plates_of(shell)
     boxes = [node.box for node in graph.nodes if node.box is not None]
     if not boxes:
         return {}
@@ -25,11 +30,21 @@ def layout_pieces(graph: ContactGraphFile, layout_folder: Path) -> dict[str, lis
     for node in graph.nodes:
         if node.node_type != "layout" or node.box is None:
             continue
-        file = layout_folder / f"{node.id}.ply"
-        mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
-        slabs = slabs_of_layout(node.id, node.class_name, node.planes, node.box, mesh, graph, middle)
+        slabs = plates.get(node.id)
+        if slabs is None:
+            file = layout_folder / f"{node.id}.ply"
+            mesh = read_mesh(file, may_be_empty=True) if file.is_file() else None
+            slabs = slabs_of_layout(node.id, node.class_name, node.planes, node.box, mesh, graph, middle)
         pieces_of[node.id] = [piece for slab in slabs if (piece := _slab_piece(slab)) is not None]
     return pieces_of
+
+
+def plates_of(shell: ShellFile | None) -> dict[str, list[Slab]]:
+    """Return layout node -> the boxes of its plates, for the nodes of a shell."""
+    plates: dict[str, list[Slab]] = {}
+    for panel in () if shell is None else shell.panels:
+        plates.setdefault(panel.node, []).extend(slabs_of_panel(panel))
+    return plates
 
 
 def _slab_piece(slab: Slab) -> ConvexPiece | None:

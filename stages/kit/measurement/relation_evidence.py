@@ -6,7 +6,10 @@ from scenewright.schemas.scene_parts import Relation
 
 
 def evidence(link: Relation) -> str:
-    """Return confidence and evidence of a relation in words: plane, gap, overlap, share inside, where they meet."""
+    """Return confidence and evidence of a relation in words: plane, gap, overlap, share inside, where they meet; of an
+    unknown carrier, why it is unknown."""
+    if link.because:
+        return link.because
     phrases = [f"confidence {link.confidence:.2f}"]
     if link.plane is not None:
         phrases.append(f"plane {link.plane} of {link.source}")

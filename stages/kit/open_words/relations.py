@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenewright.schemas.contact_graph import ContactGraphFile
-from scenewright.schemas.scene_parts import TREE_RELATIONS
+from scenewright.schemas.scene_parts import CARRYING
 
 
 def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:
@@ -13,7 +13,7 @@ def related(graph: ContactGraphFile, relation: str) -> set[tuple[int, int]]:
     pair and whatever stands on the same thing.
     """
     instances = {node.id: node.instance for node in graph.nodes}
-    parents = {link.target: link for link in graph.links if link.relation in TREE_RELATIONS}
+    parents = {link.target: link for link in graph.links if link.relation in CARRYING}
     pairs: set[tuple[int, int]] = set()
     for node in instances:
         at, inside = node, False

@@ -52,7 +52,7 @@ def trust_of(graph: ContactGraphFile, more: Mapping[str, Trust] | None = None) -
         if link is not None and node.node_type != "layout":
             share = min(share, link.confidence)
             if link.confidence < SURE:
-                reasons.append(f"that {link.source} {link.relation.replace('_', ' ')} it: {evidence(link)}")
+                reasons.append(f"{link.says}: {evidence(link)}")
         if (further := (more or {}).get(node.id)) is not None:
             share, reasons = min(share, further.share), [*reasons, *further.reasons]
         trusts[node.id] = Trust(share, tuple(reasons))
@@ -99,7 +99,7 @@ def draw_graph(
         links = [k for k in graph.links if k.relation == relation and k.source in centers and k.target in centers]
         strips = [np.stack([centers[link.source], centers[link.target]]) for link in links]
         if strips:
-            labels = [f"{link.source} {relation.replace('_', ' ')} {link.target}: {evidence(link)}" for link in links]
+            labels = [f"{link.says}: {evidence(link)}" for link in links]
             canvas.line(f"edges/{relation}", strips, [_rgb(color)] * len(strips), radius=0.008, labels=labels)
     met = [link for link in graph.links if link.contact is not None]
     if met:

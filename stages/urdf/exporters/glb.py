@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from scenewright.stages.kit.formats.link_meshes import Surface
 from scenewright.stages.kit.formats.link_poses import joint_motion
 from scenewright.stages.kit.formats.urdf_file import Urdf, UrdfJoint
 from scenewright.stages.kit.formats.written_scene import WrittenScene
-from scenewright.stages.kit.geometry.transforms import quaternion_of
+from scenewright.stages.kit.geometry.transforms import apply, inverse, quaternion_of
 from scenewright.stages.urdf.exports import SceneExporter
 
 FLOAT, UNSIGNED_INT, UNSIGNED_SHORT = 5126, 5125, 5123
@@ -179,8 +180,25 @@ class _Build:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
+def towards(surface: Surface, point: np.ndarray) -> Surface:
+    """Return the faces of a surface that look towards a point (3,) in its frame: a closed wall seen from its room."""
+    corners = surface.vertices[surface.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    looks = (normals * (point - corners[:, 0])).sum(axis=1) > 0
+    used, faces = np.unique(surface.faces[looks], return_inverse=True)
+    colors = None if surface.vertex_colors is None else surface.vertex_colors[used]
+    faces = faces.reshape(-1, 3).astype(surface.faces.dtype)
+    return replace(surface, vertices=surface.vertices[used], faces=faces, vertex_colors=colors)
+
+
 def _write(path: Path, scene: WrittenScene) -> None:
-    write_scene_glb(path, scene.urdf, scene.surfaces, scene.joint_values, one_sided=scene.layout)
+    surfaces = dict(scene.surfaces)
+    centers = np.array([body.box.center for body in scene.info.bodies]).reshape(-1, 3)
+    middle = 0.5 * (centers.min(axis=0) + centers.max(axis=0)) if len(centers) else np.zeros(3)
+    for name in scene.layout & set(surfaces):
+        at = apply(inverse(scene.link_poses[name]), middle)
+        surfaces[name] = [part for surface in surfaces[name] if len((part := towards(surface, at)).faces)]
+    write_scene_glb(path, scene.urdf, surfaces, scene.joint_values, one_sided=scene.layout)
 
 
 EXPORTER = SceneExporter("glb", order=20, file="scene.glb", write=_write)

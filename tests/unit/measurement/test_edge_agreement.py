@@ -48,6 +48,16 @@ def test_support_counts_relations_and_leaves_the_root_out():
     assert agreement["also_supports"].precision == 0.0 and agreement["also_supports"].recall is None
 
 
+def test_an_unknown_carrier_is_no_claim():
+    """It costs recall, like an edge that is not there, and no precision."""
+    unsure = [*TRUE[:5], (SCENE_NODE, "board", "unknown")]
+    agreement = edge_agreement(graph(TRUE), graph(unsure, "_x"), PARTNER)
+    for name in ("support", "any_support"):
+        assert agreement[name].precision == 1.0 and agreement[name].true_count == agreement[name].agreed + 1
+    missing, wrong = edge_errors(graph(TRUE), graph(unsure, "_x"), PARTNER)
+    assert missing == {("desk", "board", "supports"), ("wall", "board", "leans_on")} and not wrong
+
+
 def test_edges_that_are_missing_and_wrong():
     missing, wrong = edge_errors(graph(TRUE), graph(FOUND, "_x"), PARTNER)
     assert missing == {("shelf", "cup", "contains"), ("wall", "board", "leans_on")}

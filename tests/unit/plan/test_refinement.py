@@ -70,6 +70,18 @@ def test_a_table_that_could_be_pushed_is_no_item(tmp_path: Path) -> None:
     assert found[0] == found[1] and found[1][0]["table_3"] == "surface"
 
 
+def test_nothing_is_put_on_what_nothing_is_known_to_carry(tmp_path: Path) -> None:
+    unsure = [replace(body, parent=None, relation="unknown") if body.name == "table_3" else body for body in kitchen()]
+    model, graph = model_of(tmp_path, unsure)
+    objects, atoms = symbolic_state(model, graph)
+    model.close()
+    assert objects["table_3"] == "thing" and not any(
+        atom[0] in ("flat", "fits") and "table_3" in atom for atom in atoms
+    )
+    with pytest.raises(UsageError, match="table_3 is a thing"):
+        parse_goal(("on(bottle_7, table_3)",), objects)
+
+
 def test_what_the_fingers_cannot_hold_is_not_graspable(tmp_path: Path) -> None:
     heavy = [replace(body, mass=30.0) if body.name == "cup_5" else body for body in kitchen()]
     model, graph = model_of(tmp_path, heavy)

@@ -8,7 +8,7 @@ GOOD = {
     "sequence": Facts("ok", {"frames": 30, "dropped": 0, "gravity": "given"}),
     "segments": Facts("ok", {"label": "ground-truth masks"}),
     "panoptic_map": Facts("ok", {"frames": 30, "entities": 12, "frames_without_segments": 0}),
-    "contact_graph": Facts("ok", {"objects": 10, "uncertain": 0, "dropped": 0, "floor": "seen"}),
+    "contact_graph": Facts("ok", {"objects": 10, "unknown": 0, "dropped": 0, "floor": "seen"}),
     "cad_scene": Facts("ok", {"cad": 10, "mesh": 0, "alignment_error_median": 0.006, "surroundings_m2": 0.5}),
     "interactive_scene": Facts("ok", {"movable": 4, "joints": 2, "collisions": 0, "settled": 1.0}),
 }
@@ -31,7 +31,7 @@ def test_each_fault_is_named_with_what_to_do() -> None:
         (changed("sequence", dropped=30), "30 of 60 frames could not be used", "inspect LOG"),
         (changed("segments", label="geometry alone, class-agnostic"), "what things are", "--words"),
         (changed("contact_graph", floor="none"), "the floor", "record the floor"),
-        (changed("contact_graph", uncertain=5), "what 5 of 10 things stand on", "come closer"),
+        (changed("contact_graph", unknown=5), "what 5 of 10 things stand on", "come closer"),
         (changed("cad_scene", cad=1, mesh=9), "9 of 10 things keep their scanned mesh", "walk around"),
         (changed("cad_scene", cad=1, mesh=9, built_in=2), "9 of 12 things keep their scanned mesh", "walk around"),
         (changed("interactive_scene", "unsettled", reason="cup_1 moves 755 mm"), "cup_1 moves 755 mm", "urdf settle"),

@@ -61,6 +61,14 @@ def test_stamps_that_are_names_are_those_of_the_pictures() -> None:
     assert matching.places == {0: 0, 1: 1}  # 10.030 is nearer to the depth of the first
 
 
+def test_stamped_masks_of_all_frames_serve_some_of_them() -> None:
+    pictures = [Picture(f"{k / 10:.3f}") for k in range(11)]
+    matching = match_pictures(pictures, np.array([[0.0], [0.5], [1.0]]), 0.02, Path("m"))
+    assert matching.places == {0: 0, 1: 5, 2: 10} and "8 masks are of times" in matching.warnings[0]
+    with pytest.raises(BadInput, match="outside the sequence"):  # a frame without a mask: another clock, perhaps
+        match_pictures(pictures[:-1], np.array([[0.0], [0.5], [1.0]]), 0.02, Path("m"))
+
+
 def test_numbers_count_when_no_name_is_the_log_s() -> None:
     own = sources("frame_{:05d}.jpg")
     assert match([f"{k:06d}" for k in range(COUNT)], own).ways == {"name": COUNT}

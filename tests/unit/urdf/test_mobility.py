@@ -53,9 +53,12 @@ def graph_with(
         GraphNode(id="thing_2", instance=2, class_name=class_name, node_type="rigid", box=box),
         GraphNode(id="cup_3", instance=3, class_name="cup", node_type="rigid", box=top),
     ]
+    carried = {"source": "floor_1", "relation": relation, "plane": 0}
+    if relation == "unknown":
+        carried = {"source": SCENE_NODE, "relation": relation, "because": "the floor is far below"}
     links = [
         Relation(source=SCENE_NODE, target="floor_1", relation="supports", confidence=1.0),
-        Relation(source="floor_1", target="thing_2", relation=relation, confidence=1.0, plane=0),  # type: ignore[arg-type]
+        Relation.model_validate({"target": "thing_2", "confidence": 1.0, **carried}),
         Relation(source="thing_2" if on_top else "floor_1", target="cup_3", relation="supports", confidence=1.0),
     ]
     return ContactGraphFile(nodes=tuple(nodes), links=tuple(links))
@@ -75,6 +78,8 @@ def graph_with(
         (graph_with("cup", gap=0.3), Mobility(True)),
         (graph_with("object"), FREE),
         (graph_with("sofa", size=1.8), FREE),
+        (graph_with("cup", gap=0.3, relation="unknown"), Mobility(False)),
+        (graph_with("chair", relation="unknown"), Mobility(False)),
     ],
 )
 def test_what_is_free(graph: ContactGraphFile, expected: Mobility) -> None:
@@ -115,6 +120,15 @@ def scene_of(root: Path, graph: ContactGraphFile, cup: tuple[float, float, float
     graph.model_copy(update={"nodes": moved}).write(root / "graph.json")
     CadSceneFile(replacements=(), conflicts_before=0, conflicts_after=0, iterations=0).write(root / "scene.json")
     return CadScene(root)
+
+
+def test_what_nothing_is_known_to_carry_is_held_and_says_why(tmp_path: Path) -> None:
+    graph = graph_with("cup", gap=1.0, relation="unknown", size=1.0)
+    scene = scene_of(tmp_path / "cad_scene", graph, (2.0, 0.0, 0.05))
+    made = run(scene, parameters=UrdfParameters(), context=context(tmp_path / "out"))
+    held = next(body for body in made.info.bodies if body.name == "thing_2")
+    assert not held.movable and held.parent is None and held.relation == "unknown"
+    assert held.because == "held: nothing is known to carry it: the floor is far below"
 
 
 def test_a_chair_without_a_model_is_a_body_of_pieces_that_stands(tmp_path: Path) -> None:
@@ -242,6 +256,7 @@ def marked(graph: ContactGraphFile, mark: str) -> ContactGraphFile:
         (graph_with("cup"), "movable", Mobility(True)),
         (graph_with("chair", gap=0.3), "movable", FREE),
         (graph_with("picture", relation="carries_on_wall"), "movable", Mobility(False)),
+        (graph_with("cup", relation="unknown"), "movable", Mobility(False)),
     ],
 )
 def test_what_a_person_marked_is_as_they_said(graph: ContactGraphFile, mark: str, expected: Mobility) -> None:

@@ -94,7 +94,7 @@ class Seen:
 
     def keep_floor(self, picture: Picture, map_from_camera: np.ndarray, front: Front) -> None:
         """Measure the height on which things inside an open front lie: the most frequent height there [m]."""
-        points = apply(map_from_camera, back_project(picture.depth, picture.camera)[::2, ::2].reshape(-1, 3))
+        points = apply(map_from_camera, back_project(picture.depth, picture.camera, stride=2).reshape(-1, 3))
         heights = points[front.inside(points), 2]
         if len(heights) > 200:
             counts, edges = np.histogram(heights, bins=np.arange(0.0, front.size[2], 0.005))
@@ -140,7 +140,7 @@ class Seen:
         """Measure the height of the top of furniture that fills the picture: the most frequent height [m]."""
         if piece is None:
             return
-        points = apply(map_from_camera, back_project(picture.depth, picture.camera)[::3, ::3].reshape(-1, 3))
+        points = apply(map_from_camera, back_project(picture.depth, picture.camera, stride=3).reshape(-1, 3))
         low, high = self.pieces[piece].box
         inside = np.all((points[:, :2] > low[:2]) & (points[:, :2] < high[:2]), axis=1)
         heights = points[inside & (np.abs(points[:, 2] - high[2]) < 0.08), 2]

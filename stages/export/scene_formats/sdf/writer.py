@@ -20,6 +20,8 @@ from scenewright.stages.kit.geometry.transforms import inverse
 from scipy.spatial.transform import Rotation
 
 VERSION = "1.9"
+LAMP = (0.0, 0.0, 3.0)
+"""Where it hangs in scenes that do not say [m]."""
 
 
 def write(folder: Path, scene: SceneToExport) -> Written:
@@ -27,10 +29,7 @@ def write(folder: Path, scene: SceneToExport) -> Written:
     root = Element("sdf", version=VERSION)
     world = SubElement(root, "world", name="scene")
     SubElement(world, "gravity").text = "0 0 -9.81"
-    sun = SubElement(world, "light", name="sun", type="directional")
-    SubElement(sun, "pose").text = "0 0 10 0 0 0"
-    SubElement(sun, "diffuse").text = "0.9 0.9 0.9 1"
-    SubElement(sun, "direction").text = "-0.4 0.2 -0.9"
+    _add_lamp(world, scene)
     for body in scene.bodies:
         world.append(_model(body, scene))
     ElementTree.indent(root, " ")
@@ -45,6 +44,16 @@ def write(folder: Path, scene: SceneToExport) -> Written:
         names={allowed(name): name for name in sorted(names) if allowed(name) != name},
         joint_zero={name: value for name, value in sorted(values.items()) if value},
     )
+
+
+def _add_lamp(world: Element, scene: SceneToExport) -> None:
+    light = scene.written.info.light
+    lamp = SubElement(world, "light", name="lamp", type="point")
+    SubElement(lamp, "pose").text = f"{numbers(LAMP if light is None else light.position)} 0 0 0"
+    SubElement(lamp, "diffuse").text = "0.9 0.9 0.9 1"
+    fades = SubElement(lamp, "attenuation")
+    for name, value in (("range", "30"), ("constant", "0.6"), ("linear", "0.05"), ("quadratic", "0.01")):
+        SubElement(fades, name).text = value
 
 
 def allowed(name: str) -> str:

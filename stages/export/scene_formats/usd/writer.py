@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade, Vt
 from scenewright.stages.export.scene_bodies import BodyToExport, SceneToExport
 from scenewright.stages.export.scene_registry import Written
 from scenewright.stages.kit.formats.link_meshes import Surface
@@ -21,6 +21,10 @@ from scenewright.stages.kit.rendering.surfaces import srgb_to_linear
 from scipy.spatial.transform import Rotation
 
 GRAVITY = 9.81
+LAMP_RADIUS = 0.1
+"""Of the ball that shines [m]; by eye."""
+LAMP_INTENSITY, THROWN_BACK = 30000.0, 200.0
+"""Of the lamp, and of the light from all around; by eye."""
 """Acceleration of free fall that the scene states [m/s^2]."""
 WORLD = "/World"
 
@@ -39,6 +43,7 @@ def write(folder: Path, scene: SceneToExport) -> Written:
     writer = _Writer(stage, scene)
     for body in scene.bodies:
         writer.add_body(body)
+    writer.add_lamp()
     layer.Save()
     return Written(names=writer.renamed)
 
@@ -53,6 +58,18 @@ class _Writer:
         self._paths: dict[str, str] = {}
         self._used_names: set[str] = set()
         self._surface_materials: dict[float, UsdShade.Material] = {}
+
+    def add_lamp(self) -> None:
+        """Add one lamp, and as much light from all around as walls throw back."""
+        light = self.scene.written.info.light
+        if light is None:
+            return
+        lamp = UsdLux.SphereLight.Define(self.stage, self._path(WORLD, "lamp"))
+        lamp.CreateRadiusAttr(LAMP_RADIUS)
+        lamp.CreateIntensityAttr(LAMP_INTENSITY)
+        lamp.AddTranslateOp().Set(Gf.Vec3d(*light.position))
+        around = UsdLux.DomeLight.Define(self.stage, self._path(WORLD, "thrown_back"))
+        around.CreateIntensityAttr(THROWN_BACK)
 
     def add_body(self, body: BodyToExport) -> None:
         """Add /World/<body> with its links and joints."""

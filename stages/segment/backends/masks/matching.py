@@ -112,18 +112,25 @@ def _both_fit(named: Sequence[_Found], counted: Sequence[_Found]) -> bool:
 def _placed(
     pictures: Sequence[Picture], found: Sequence[_Found], times: np.ndarray, where: Path, warnings: Sequence[str]
 ) -> Matching:
-    """Return the matching of pictures whose frames were found. Raises BadInput for none, and for two of one frame."""
+    """Return the matching of pictures whose frames were found. Masks of times between frames are left out where every
+    frame has its own: somebody made them for all of the log. Raises BadInput for other masks of no frame, and for two
+    of one frame."""
     picture_of_frame: dict[int, int] = {}
     match_counts: Counter[str] = Counter()
     astray: list[str] = []
+    only_stamps = True
     for index, (picture, place) in enumerate(zip(pictures, found, strict=True)):
         if place.frame is None:
             astray.append(f"{picture.name or 'image'} ({place.way} {place.stated})")
+            only_stamps &= place.way == STAMP
             continue
         if place.frame in picture_of_frame:
             raise _two_of_one_frame(pictures, picture_of_frame[place.frame], index, place.frame, where)
         picture_of_frame[place.frame] = index
         match_counts[place.way] += 1
+    if astray and only_stamps and len(picture_of_frame) == len(times) and len(times):
+        left_out = f"{len(astray)} masks are of times at which the sequence has no frame, and are left out"
+        return Matching(picture_of_frame, match_counts, (*warnings, left_out))
     if astray:
         astray_text = ", ".join(astray[:SHOWN]) + (", ..." if len(astray) > SHOWN else "")
         raise BadInput(
