@@ -12,7 +12,7 @@ from scenewright.stages.kit.formats.map_files import write_arrays
 from scenewright.stages.kit.open_words.encoder import check_width, checked_text
 from scenewright.stages.kit.open_words.finding import Finder, Found
 from scenewright.stages.kit.open_words.opening import open_encoder
-from scenewright.stages.kit.open_words.reading.phrase import Phrase, read_phrase
+from scenewright.stages.kit.open_words.reading.phrase import Contradiction, Phrase, read_phrase
 from scenewright.stages.kit.stage import Context
 from scenewright.stages.splat.parameters import QueryParameters
 
@@ -35,7 +35,7 @@ def run(
     check_width(encoder, info.width, info.encoder, str(language.root))
     finder = Finder(language, encoder)
     graph = contact_graph.info if contact_graph is not None else None
-    phrase = _read(text, context)
+    phrase, heard_line = _read(text)
     parts: tuple[str, ...] = (text,)
     relation = ""
     if graph is not None and phrase is not None and phrase.other is not None:
@@ -45,6 +45,7 @@ def run(
         relation = f" {phrase.relation} ".join(parts)
     else:
         ranking = finder.find(text, phrase)
+    context.logger.info("%s", heard_line)
     nodes = {node.instance: node.id for node in graph.nodes if node.instance} if graph is not None else {}
     least = parameters.least_probability
     likely = [answer for answer in ranking if answer.probability >= least][: parameters.most]
@@ -90,15 +91,16 @@ def run(
     return Answers(context.output, outcome="ok" if likely else none, summary=summary)
 
 
-def _read(text: str, context: Context) -> Phrase | None:
-    """Return what a text is read as, and say so in a line; None where only the encoder may understand it."""
+def _read(text: str) -> tuple[Phrase | None, str]:
+    """Return what a text is read as, and a line that says so, or why only the encoder may understand it. Raises
+    UsageError for a contradiction."""
     try:
         phrase = read_phrase(text)
+    except Contradiction:
+        raise
     except UsageError as error:
-        context.logger.warning("%s; the encoder is asked all the same", error.message)
-        return None
-    context.logger.info("%s", phrase.said())
-    return phrase
+        return None, f"{error.message}; the encoder is asked all the same"
+    return phrase, phrase.said()
 
 
 def _check_same_map(language: LanguageMap, graph: ContactGraphFile) -> None:

@@ -13,7 +13,7 @@ from scenewright.stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits
 from scenewright.stages.kit.open_words.calibration import NAMED_SPLAT, Calibration, calibration_of, log_odds, recognised
 from scenewright.stages.kit.open_words.encoder import Encoder
 from scenewright.stages.kit.open_words.reading.evidence import Names
-from scenewright.stages.kit.open_words.reading.matching import Match, Thing, is_layout, matches
+from scenewright.stages.kit.open_words.reading.matching import Thing, is_layout, matches
 from scenewright.stages.kit.open_words.reading.meaning import Meanings
 from scenewright.stages.kit.open_words.reading.phrase import Phrase, read_phrase
 from scenewright.stages.kit.open_words.relations import related
@@ -46,6 +46,17 @@ def thing_of(region: LanguageRegion) -> Thing:
         max(region.box.size),
         bool(region.class_name) and is_layout(region.class_name),
     )
+
+
+def things_of(info: LanguageMapFile) -> tuple[list[Thing], np.ndarray]:
+    """Return the distinct things of a language map, and (R,) which of them each region is a piece of; regions of no
+    entity are one thing without names."""
+    first: dict[int, int] = {}
+    for number, region in enumerate(info.regions):
+        first.setdefault(region.instance, number)
+    place = {instance: k for k, instance in enumerate(first)}
+    things = [thing_of(info.regions[number]) for number in first.values()]
+    return things, np.array([place[region.instance] for region in info.regions], int)
 
 
 @dataclass(frozen=True)
@@ -88,7 +99,7 @@ class Finder:
         self.is_strange = self.recognised is not None and self.recognised < self.calibration.least_recognised
         self.has_names = any(region.names for region in self.info.regions)
         self.meanings = meanings or Meanings()
-        self._things = [thing_of(region) for region in self.info.regions]
+        self._things, self._thing = things_of(self.info)
 
     @property
     def by_names(self) -> bool:
@@ -98,7 +109,7 @@ class Finder:
     def fits(self, text: str, phrase: Phrase | None = None) -> Fits:
         """Return how well a text fits every region; `phrase`: what it was read as, read here where it is not given."""
         phrase = (phrase or heard(text)) if self.by_names else None
-        named = np.array([match.probability for match in self._matches(phrase)]) if phrase is not None else None
+        named = None if phrase is None else self._named(phrase)
         if named is not None and self.is_strange:
             return Fits(np.zeros(len(named)), None, None, named, self._lit(named))
         fits_of_text = fits(
@@ -112,8 +123,9 @@ class Finder:
     def find(self, text: str, phrase: Phrase | None = None) -> list[Found]:
         """Return places, the likeliest first, of which no two are one."""
         fits_of_text = self.fits(text, phrase)
-        order = ranked(self.info, self.index, fits_of_text.probabilities)
-        return [self._result_of(fits_of_text, region) for region in self._one_an_entity(order)]
+        chances = fits_of_text.probabilities
+        order = self._one_an_entity(chances) if self.by_names else ranked(self.info, self.index, chances)
+        return [self._result_of(fits_of_text, region) for region in order]
 
     def find_related(self, phrase: Phrase, graph: ContactGraphFile) -> list[Found]:
         """Return places of the first thing of a relation; the probability of both is the product, and of several others
@@ -151,8 +163,10 @@ class Finder:
             return np.array(self.info.regions[region].box.center)
         return points[int(np.linalg.norm(points - np.median(points, axis=0), axis=1).argmin())]
 
-    def _matches(self, phrase: Phrase) -> list[Match]:
-        return matches(phrase, self._things, self.meanings)
+    def _named(self, phrase: Phrase) -> np.ndarray:
+        """Return (R,) how likely each region is what a phrase asks for; pieces of an entity are as likely as it is."""
+        found = matches(phrase, self._things, self.meanings)
+        return np.array([match.probability for match in found])[self._thing]
 
     def _lit(self, probabilities: np.ndarray) -> np.ndarray | None:
         """Return (N,) per Gaussian the probability of its likeliest piece; None without any."""
@@ -161,12 +175,19 @@ class Finder:
             return None
         return np.where(pieces >= 0, probabilities[pieces], 0.0).max(axis=0, initial=0.0)
 
-    def _one_an_entity(self, order: list[int]) -> list[int]:
-        """Return regions of which no two are pieces of one entity, where names answer: they all have its name."""
-        if not self.by_names:
-            return order
-        instances = [self.info.regions[k].instance for k in order]
-        return [k for n, k in enumerate(order) if not instances[n] or instances[n] not in instances[:n]]
+    def _one_an_entity(self, probabilities: np.ndarray) -> list[int]:
+        """Return the likeliest regions of which any is likely at all, none two pieces of one entity: all have its
+        name."""
+        order: list[int] = []
+        told: set[int] = set()
+        for region in np.argsort(-probabilities, kind="stable"):
+            if len(order) == MOST_ANSWERS or probabilities[region] <= 0:
+                break
+            instance = self.info.regions[region].instance
+            if not instance or instance not in told:
+                order.append(int(region))
+                told.add(instance)
+        return order
 
     def _result_of(self, fits_of_text: Fits, region: int) -> Found:
         field, size = None, None
@@ -179,7 +200,7 @@ class Finder:
             float(fits_of_text.looks[region]),
             field,
             size,
-            doubtful=self.by_names and self._things[region].names.is_doubtful(),
+            doubtful=self.by_names and self._things[self._thing[region]].names.is_doubtful(),
         )
 
 

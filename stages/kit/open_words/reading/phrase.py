@@ -44,6 +44,10 @@ EXAMPLE = 'ask in English: "red mug", "the cup on the desk"'
 _ASKED = {"where": "{}", "place": "a place for {}", "count": "how many {}", "is_there": "whether there is {}"}
 
 
+class Contradiction(UsageError):
+    """Words that nothing can be true of."""
+
+
 @dataclass(frozen=True)
 class Phrase:
     """What words ask for."""
@@ -88,7 +92,7 @@ class Phrase:
 def read_phrase(text: str) -> Phrase:
     """Return what a phrase asks for.
 
-    Raises UsageError, a line each, for no words, too many, another language, no noun, several, and contradictions.
+    Raises UsageError, a line each, for no words, too many, another language, no noun and several; Contradiction.
     """
     given = checked_text(text)
     words = plain(given)
@@ -193,7 +197,7 @@ def _check(given: str, words: str, heard: _Heard, may_be_anything: bool) -> None
     for kind in ("color", "size"):
         several = heard.of(kind)
         if len(several) > 1 and (kind == "size" or not re.search(r"\b(?:and|or)\b", words)):
-            raise UsageError(f"{given!r:.80}: nothing is {' and '.join(several)} at once", hint=f"name one {kind}")
+            raise Contradiction(f"{given!r:.80}: nothing is {' and '.join(several)} at once", hint=f"name one {kind}")
     before = words.split(" and ")[0]
     if before != words and is_noun(_bare(before)) and _bare(before).split()[-1] not in adjectives():
         raise UsageError(f"{given!r:.80} names several things", hint="ask for one at a time")
