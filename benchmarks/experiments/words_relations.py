@@ -1,4 +1,4 @@
-"""Generated rooms asked by names alone, as recorded rooms are: which threshold rejects, and are relations right?
+"""Generated rooms asked by names alone, as recorded ones are: what rejects, and how often relations are right.
 
 The map is of our own network's masks. Its entities are asked by the names and posteriors that the map gave them,
 without looks; relations are answered by its contact graph. Texts are those that generated rooms are asked, and for

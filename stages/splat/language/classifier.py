@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import LARGEST_SETTINGS, file_text
 from scenewright.stages.kit.class_extents import LARGEST_EXTENT
 from scenewright.stages.kit.needed import needed
 from scenewright.stages.kit.open_words.reading.names import class_named
@@ -59,10 +60,10 @@ class CropClassifier:
 
 def labels_of(path: Path) -> tuple[str, ...]:
     """Return the names of a classifier's outputs. Raises BadInput for a missing or empty file."""
+    text = file_text(path, LARGEST_SETTINGS, hint="a row a class, its name last")
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            rows = [row[-1].strip().replace("_", " ").lower() for row in csv.reader(stream) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        rows = [row[-1].strip().replace("_", " ").lower() for row in csv.reader(text.splitlines()) if row]
+    except csv.Error as error:
         raise BadInput(f"{path}: no labels ({error})", hint="a row a class, its name last") from None
     if not rows:
         raise BadInput(f"{path}: no labels", hint="a row a class, its name last")

@@ -115,6 +115,12 @@ def refused(path: str, says: str, given, code: int = 3) -> Tried:  # type: ignor
 
 
 ROWS = [
+    Tried(
+        "stages/ingest/stage.py",
+        "--every 5",
+        "ingest --log {walks}/unposed_log/frames.mcap --every auto --out out",
+        "ingest --log {walks}/unposed_log/frames.mcap --every 5 --out out",
+    ),
     refused(FILES, "intrinsics are for", tum(CAMODOCAL.replace("96", "72"), "lens.yaml")),
     refused(FILES, "are those of no camera", tum("0 0 1 1")),
     NotTried(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile
 from scenewright.schemas.errors import UsageError
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -71,7 +71,9 @@ def test_a_table_that_could_be_pushed_is_no_item(tmp_path: Path) -> None:
 
 
 def test_nothing_is_put_on_what_nothing_is_known_to_carry(tmp_path: Path) -> None:
-    unsure = [replace(body, parent=None, relation="unknown") if body.name == "table_3" else body for body in kitchen()]
+    unsure = [
+        replace(body, parent=SCENE_NODE, relation="unknown") if body.name == "table_3" else body for body in kitchen()
+    ]
     model, graph = model_of(tmp_path, unsure)
     objects, atoms = symbolic_state(model, graph)
     model.close()

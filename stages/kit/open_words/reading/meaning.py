@@ -6,7 +6,6 @@ lexicon (data/words/meanings.toml; `python -m benchmarks.words.meanings`). No la
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_toml
 from scenewright.schemas.places import REINSTALL, data_file
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.kit.open_words.reading.names import class_named, senses_named
@@ -63,7 +63,7 @@ def calibration(path: Path | None = None) -> Calibration:
     """Return the fitted probabilities. Raises BadInput for a damaged file."""
     file = path or data_file(FILE)
     try:
-        row = tomllib.loads(file.read_text(encoding="utf-8"))
+        row = file_toml(file, hint=REINSTALL)
         return Calibration(
             float(row["vocabulary"]["named"]),
             float(row["vocabulary"]["synonym"]),

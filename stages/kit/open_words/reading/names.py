@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from scenewright.schemas.places import data_file
+from scenewright.schemas.outside import file_toml
+from scenewright.schemas.places import REINSTALL, data_file
 from scenewright.stages.kit.labels import ANYTHING, class_of_word
 from scenewright.stages.kit.open_words.reading.nouns import nouns
 
@@ -65,7 +65,7 @@ def is_noun(words: str) -> bool:
 @cache
 def adjectives() -> dict[str, tuple[str, str]]:
     """Return adjective -> its kind (`color`, `size`, `material`) and what it says."""
-    table = tomllib.loads(data_file(ATTRIBUTES_FILE).read_text(encoding="utf-8"))
+    table = file_toml(data_file(ATTRIBUTES_FILE), hint=REINSTALL)
     return {word: (kind, name) for kind, names in table.items() for name, words in names.items() for word in words}
 
 
@@ -80,7 +80,7 @@ class Want:
 @cache
 def wants() -> dict[str, Want]:
     """Return what people say -> what they want."""
-    rows: Sequence[dict[str, object]] = tomllib.loads(data_file(WANTS_FILE).read_text(encoding="utf-8"))["want"]
+    rows: Sequence[dict[str, object]] = file_toml(data_file(WANTS_FILE), hint=REINSTALL)["want"]
     found = {}
     for row in rows:
         said, serving = row["said"], row["nouns"]

@@ -7,7 +7,6 @@ authors. An installation may lack it: then nothing is known of nouns beyond our 
 from __future__ import annotations
 
 import gzip
-import tomllib
 import zlib
 from collections import defaultdict
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from scenewright.schemas.errors import BadInput
+from scenewright.schemas.outside import file_toml
 from scenewright.schemas.places import REINSTALL, data_file
 
 FILE = "words/nouns.txt.gz"
@@ -107,5 +107,5 @@ def anchors() -> dict[str, frozenset[int]]:
     table = nouns()
     if table is None:
         return {}
-    written = tomllib.loads(data_file(ANCHORS_FILE).read_text(encoding="utf-8"))["senses"]
+    written = file_toml(data_file(ANCHORS_FILE), hint=REINSTALL)["senses"]
     return {name: frozenset().union(*map(table.anchored, each)) for name, each in written.items()}
