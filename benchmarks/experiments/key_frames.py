@@ -96,8 +96,8 @@ EXPERIMENT = Experiment(
     simulated="Rooms, walks, images and noisy depth; masks are the true ones with lasting errors of a detector.",
     knows="Poses, and masks of every frame.",
     does_not_show=(
-        "A recording at 30 frames a second: the walks have 7.5, so key frames are a larger share of them. Blur: images "
-        "are sharp. Networks, whose time falls with the number of frames."
+        "A recording at a camera's full rate: the walks have a quarter of it, so key frames are a larger share. "
+        "Blur: images are sharp. Networks, whose time falls with the number of frames."
     ),
     arms={ALL: "all frames", KEY: "key frames", EVENLY: "as many frames, evenly"},
     cases=(ROOMS,),
