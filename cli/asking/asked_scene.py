@@ -8,11 +8,11 @@ from functools import cached_property
 from scenewright.cli.viewing.desk.generations import behind
 from scenewright.schemas.artifact import Artifact
 from scenewright.schemas.cad_scene import CadScene
-from scenewright.schemas.contact_graph import ContactGraph, ContactGraphFile
+from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraph, ContactGraphFile
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.panoptic_map import PanopticMap
-from scenewright.schemas.scene_parts import TREE_RELATIONS, Box
+from scenewright.schemas.scene_parts import Box
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.vocabulary import UNNAMED
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh, load_entity_mesh
@@ -69,9 +69,8 @@ class AskedScene:
 
     def carrier(self, name: str) -> str:
         """Return what carries or holds a thing; "" where nobody knows."""
-        links = self.graph.links if self.graph is not None else ()
-        found = (link.source for link in links if link.target == name and link.relation in TREE_RELATIONS)
-        return next(found, "").replace("scene", "")
+        link = None if self.graph is None else self.graph.parent_link(name)
+        return "" if link is None or link.source == SCENE_NODE else link.source
 
     def _things(self) -> list[AskedThing]:
         names = names_of_map(self.map)
