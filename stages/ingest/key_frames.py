@@ -15,6 +15,7 @@ from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.source import Entry, LoadedFrame, Unusable
 from scenewright.stages.kit.formats.foxglove import decode_color, millimetres_to_depth
 from scenewright.stages.kit.geometry.cameras import back_project
+from scenewright.stages.kit.geometry.surface_samples import STRIDE_ANGLE
 from scenewright.stages.kit.geometry.transforms import apply
 
 TURN = np.radians(5.0)
@@ -35,8 +36,6 @@ ENOUGH = 3
 """Looks at a cell from one direction after which another adds nothing: masks vote, and one vote is none. By eye."""
 ADDS = 0.1
 """Least share of a frame's cells that are new for it to be chosen. By eye."""
-STRIDE_ANGLE = 0.014
-"""Angle between the pixels of depth that are counted [rad]."""
 SHARPNESS_WIDTH = 320
 """Width at which sharpness is measured [pixels]: noise of single pixels is none."""
 
