@@ -99,18 +99,22 @@ class Generator:
     def _library(self, seed: int, out: Path) -> None:
         self._run("library build", out, "--seed", seed)
 
-    def room(self, name: str, rung: Rung, *, clutter: str = "medium") -> RoomInputs:
-        """Return the inputs of a room, made where they are missing. Raises MethodFailed, for a seed without a room."""
-        folder = self.root / "rooms" / name / rung.recording
+    def truth(self, name: str, rung: Rung, *, clutter: str = "medium") -> Path:
+        """Return the true room, made where it is missing. Raises MethodFailed, for a seed without a room."""
         recipe, seed = name.rsplit("-", 1)
         dense = rung.recording != "exact"
         frames = DENSER * (FRAMES - 1) + 1 if dense else FRAMES
         drawn = ("--recipe", recipe, "--seed", seed, "--clutter", clutter, "--frames", frames, *SIZE)
         more = () if dense else ("--no-depth-noise",)
         scale = ("--rescaled", RESCALED) if rung.rescaled else ()
-        library, truth = self.root / "library", folder / "truth"
-        words = ("--library", library, *drawn, *more, *scale)
-        self._made(truth, lambda out: self._run("synthesize", out, *words))
+        words = ("--library", self.root / "library", *drawn, *more, *scale)
+        folder = self.root / "rooms" / name / rung.recording
+        return self._made(folder / "truth", lambda out: self._run("synthesize", out, *words))
+
+    def room(self, name: str, rung: Rung, *, clutter: str = "medium") -> RoomInputs:
+        """Return the inputs of a room, made where they are missing. Raises MethodFailed, for a seed without a room."""
+        folder, library = self.root / "rooms" / name / rung.recording, self.root / "library"
+        truth, dense = self.truth(name, rung, clutter=clutter), rung.recording != "exact"
         log, every = truth / "log.mcap", DENSER if dense else 1
         mapped = self._made(folder / "frames", lambda out: self._run("ingest", out, "--log", log, "--every", every))
         drawn_by = error_seed(f"{name}/{rung.recording}")

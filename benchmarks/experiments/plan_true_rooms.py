@@ -42,7 +42,7 @@ class RoomTasks:
 
 def truth_of(bench: Bench, name: str) -> Path:
     """Return the truth of a room, made where it is missing. Raises MethodFailed for a seed without a room."""
-    return Generator(bench.parameters.board).room(name, RUNGS[RUNG]).truth
+    return Generator(bench.parameters.board).truth(name, RUNGS[RUNG])
 
 
 def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
