@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.kit.geometry.boxes import minimum_rectangle
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 FINGER_DEPTH = 0.032
@@ -28,9 +29,9 @@ ALIKE, ALIKE_WIDE = 0.1, 0.006
 LEAST = 10
 """Points between the fingers."""
 HEADINGS = 16
-"""Headings of the hand that are tried; by eye."""
-PITCHES = (np.pi / 2, 1.1, 0.7)
-"""How steeply the hand comes, from above first [rad]."""
+"""Headings of the hand that are tried all around, beside those along the sides of what was seen; by eye."""
+PITCHES = (np.pi / 2, 1.1, 0.7, 0.35, 0.0)
+"""How steeply the hand comes, from above first [rad]: the flatter, the farther the arm reaches over a table."""
 FORWARD_PITCHES = (0.15, 0.0, 0.35)
 """Pitches of the hand that goes into a shelf [rad], in the order in which they are tried."""
 LEVEL = 0.5
@@ -82,6 +83,8 @@ def antipodal_grasps(
     the open fingers.
     """
     low, high = np.percentile(points, 2, axis=0), np.percentile(points, 98, axis=0)
+    sides = minimum_rectangle(points[:, :2])[2] + np.pi / 2 * np.arange(4)  # a box that turned is wider than the hand
+    headings = [*(2 * np.pi * np.arange(HEADINGS) / HEADINGS), *sides]
     ranked_grasps = []
     for rank, pitch in enumerate(pitches):
         deepest = max(high[2] - FINGER_DEPTH, (low[2] + high[2]) / 2 - 0.005)
@@ -90,13 +93,13 @@ def antipodal_grasps(
             at = np.array(
                 [*_middle_above(points, height), max(height, floor + 0.004 + jaws.tip_before * np.sin(pitch))]
             )
-            for number in range(HEADINGS):
-                grasp = _grasp_at(points, normals, at, 2 * np.pi * number / HEADINGS, pitch, jaws, margin)
+            for number, heading in enumerate(headings):
+                grasp = _grasp_at(points, normals, at, heading, pitch, jaws, margin)
                 if grasp is not None:
                     pose, square, width = grasp
                     off = round(abs(height - (low[2] + high[2]) / 2) / OFF)
                     kind = (square < FACES, rank, -round(square / ALIKE), off, round(width / ALIKE_WIDE))
-                    ranked_grasps.append((kind, number * 7 % HEADINGS, pose))
+                    ranked_grasps.append((kind, number * 7 % len(headings), pose))
     ranked_grasps.sort(key=lambda entry: entry[:2])
     return [pose for *_, pose in ranked_grasps]
 
@@ -132,7 +135,7 @@ def _grasp_at(
         depth = depth - deeper
     under_palm = (np.abs(along) < jaws.half_palm[0]) & (np.abs(aside) < jaws.half_palm[1])
     room = (jaws.opening - margin) / 2
-    if np.abs(along[way_in]).max() > room or (under_palm & (depth < -FINGER_DEPTH)).sum() > LEAST:
+    if np.abs(along[way_in]).max() > room or (under_palm & (depth < -FINGER_DEPTH - BEFORE_PALM)).sum() > LEAST:
         return None
     facing = np.abs(normals @ closing)
     ends = [between & (along < first + ENDS), between & (along > last - ENDS)]

@@ -30,8 +30,8 @@ from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
 
-CANDIDATES = 20
-"""Grasps that are tried, those from above first (Han 2024, 3.3.3)."""
+CANDIDATES = 40
+"""Grasps that are tried, those from above first: eight of each of five pitches; Han 2024, 3.3.3, has 20 from above."""
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
 APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
