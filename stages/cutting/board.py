@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.stages.cutting.world.body import Body
 from scenewright.stages.kit.geometry.substances import FRICTION_OF_LIKE, ROLLING_FRICTION, SPINNING_FRICTION
 from scenewright.stages.kit.geometry.transforms import transform_from_quaternion
+from scenewright.stages.kit.simulation.bodies import box_body
 from scenewright.stages.kit.simulation.engine import engine
 
 SIZE = (1.2, 0.6)
@@ -31,9 +32,7 @@ class Board:
         engine.setPhysicsEngineParameter(
             fixedTimeStep=TIME_STEP, deterministicOverlappingPairs=1, physicsClientId=self.client
         )
-        half = [0.5 * SIZE[0], 0.5 * SIZE[1], 0.01]
-        shape = engine.createCollisionShape(engine.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-        self._board = engine.createMultiBody(0, shape, -1, [0, 0, -0.01], physicsClientId=self.client)
+        self._board = box_body(self.client, (0.5 * SIZE[0], 0.5 * SIZE[1], 0.01), (0, 0, -0.01))
         self._rub(self._board)
         self.turned: list[float] = []
         """Angles through which fragments turned [rad]."""

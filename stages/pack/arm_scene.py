@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scenewright.schemas.packing import TABLE_TOP
 from scenewright.stages.kit.motion.collision import Collision
+from scenewright.stages.kit.simulation.bodies import box_body, links_and_joints
 from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
 from scenewright.stages.pack.arm import FixedArm
 from scenewright.stages.pack.hand import Named
@@ -28,12 +29,8 @@ class ArmScene:
                 physicsClientId=self.client,
                 flags=engine.URDF_USE_SELF_COLLISION | engine.URDF_USE_INERTIA_FROM_FILE,
             )
-        names = {}
-        self._links = {-1: description.arm_base}
-        for index in range(engine.getNumJoints(self._robot, physicsClientId=self.client)):
-            info = engine.getJointInfo(self._robot, index, physicsClientId=self.client)
-            names[info[1].decode()] = index
-            self._links[index] = info[12].decode()
+        links, names = links_and_joints(self._robot, self.client)
+        self._links = {-1: description.arm_base} | {index: name for name, index in links.items()}
         self._joints = [names[name] for name in description.arm_joints]
         for name in description.finger_joints:
             engine.resetJointState(self._robot, names[name], description.opening / 2, physicsClientId=self.client)
@@ -41,7 +38,7 @@ class ArmScene:
         self._bodies: list[tuple[int, str]] = []
         self._held: tuple[int, np.ndarray] | None = None
         self._tool = next(index for index, name in self._links.items() if name == description.tool_link)
-        self._table = self._box((1.5, 1.5, 0.005), (0.0, 0.0, TABLE_TOP - 0.005), 0.0)
+        self._table = box_body(self.client, (1.5, 1.5, 0.005), (0.0, 0.0, TABLE_TOP - 0.005))
         for link in (-1, self._joints[0]):  # what turns about the vertical in its place
             engine.setCollisionFilterPair(self._robot, self._table, link, -1, 0, physicsClientId=self.client)
 
@@ -62,17 +59,9 @@ class ArmScene:
                         self._robot, self._robot, first, second, 0, physicsClientId=self.client
                     )
 
-    def _box(self, half: tuple[float, float, float], centre: tuple[float, float, float], yaw: float) -> int:
-        shape = engine.createCollisionShape(engine.GEOM_BOX, halfExtents=list(half), physicsClientId=self.client)
-        return int(
-            engine.createMultiBody(
-                0, shape, -1, list(centre), engine.getQuaternionFromEuler([0, 0, yaw]), physicsClientId=self.client
-            )
-        )
-
     def _stand(self, block: Block) -> int:
         half = (block.half_width, block.half_length, (block.top - block.bottom) / 2)
-        return self._box(half, (block.x, block.y, (block.top + block.bottom) / 2), block.yaw)
+        return box_body(self.client, half, (block.x, block.y, (block.top + block.bottom) / 2), yaw=block.yaw)
 
     def arrange(self, others: tuple[Named, ...], held: tuple[str, Block, float] | None) -> None:
         """Put blocks into the scene in place of those of the last time.

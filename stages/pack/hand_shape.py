@@ -5,12 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scenewright.stages.kit.formats.link_poses import link_poses
-from scenewright.stages.kit.formats.urdf_file import parse_urdf
-from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
-from scenewright.stages.kit.simulation.shapes import link_shapes
-from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes
+from scenewright.stages.kit.simulation.robot_shapes import points_at_tool
 
 MILLIMETRE = 0.001
 
@@ -32,16 +28,8 @@ PUBLISHED = HandShape()
 
 def measured(robot: RobotDescription) -> HandShape:
     """Return a hand's blocks by its collision shapes, rounded outwards to millimetres."""
-    urdf = parse_urdf(robot.urdf)
-    shapes = link_shapes(with_absolute_meshes(read_urdf(robot.urdf), robot.urdf.parent))
-    poses = link_poses(urdf, dict.fromkeys(robot.finger_joints, robot.opening / 2))
-    tool_from_world = inverse(poses[robot.tool_link])
-
-    def points(link: str) -> np.ndarray:
-        found = [apply(tool_from_world @ poses[link], mesh.vertices) for mesh in shapes[link]]
-        return np.concatenate(found) if found else np.zeros((1, 3))
-
-    palm, fingers = points(robot.hand_link), [points(link) for link in robot.finger_links]
+    points = points_at_tool(robot, (robot.hand_link, *robot.finger_links), robot.opening)
+    palm, *fingers = [found if len(found) else np.zeros((1, 3)) for found in points]
     inner = min(float(np.abs(finger[:, 1]).min()) for finger in fingers)
     outer = max(float(np.abs(finger[:, 1]).max()) for finger in fingers)
     finger = np.concatenate(fingers)

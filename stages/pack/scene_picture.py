@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.colors import to_rgba
 from scenewright.schemas.packing import BASKET_TOP, TABLE_TOP
+from scenewright.stages.kit.simulation.bodies import links_and_joints
 from scenewright.stages.kit.simulation.engine import engine, native_output_to_stderr
 from scenewright.stages.pack.arm import FixedArm
 from scenewright.stages.pack.records import Rectangle
@@ -31,8 +32,7 @@ def render_scene(
             robot = engine.loadURDF(str(arm.description.urdf), useFixedBase=True, physicsClientId=client)
         values = dict(zip(arm.description.arm_joints, joints.tolist(), strict=True))
         values |= dict.fromkeys(arm.description.finger_joints, arm.description.opening / 2)
-        for index in range(engine.getNumJoints(robot, physicsClientId=client)):
-            name = engine.getJointInfo(robot, index, physicsClientId=client)[1].decode()
+        for name, index in links_and_joints(robot, client)[1].items():
             if name in values:
                 engine.resetJointState(robot, index, values[name], physicsClientId=client)
         _block(client, Block(0.45, 0.0, 0.0, 0.75, 0.9, TABLE_TOP - 0.01, TABLE_TOP), TABLE_COLOR)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.schemas.packing import BASKET_SLAB, BASKET_TOP, TABLE_TOP
+from scenewright.stages.kit.simulation.bodies import box_body
 from scenewright.stages.kit.simulation.engine import engine
 from scenewright.stages.pack.instances import Instance
 from scenewright.stages.pack.records import BoxState
@@ -35,24 +36,21 @@ class SettlingTable:
         engine.setPhysicsEngineParameter(
             fixedTimeStep=TIME_STEP, deterministicOverlappingPairs=1, physicsClientId=self.client
         )
-        self._box((1.5, 1.5, 0.005), (0, 0, TABLE_TOP - 0.005), 0.0)
+        box_body(self.client, (1.5, 1.5, 0.005), (0, 0, TABLE_TOP - 0.005))
         low, high = np.array(instance.basket.low), np.array(instance.basket.high)
         middle, half = (low + high) / 2, (high - low) / 2
-        self._box((half[0], half[1], BASKET_SLAB / 2), (middle[0], middle[1], BASKET_TOP - BASKET_SLAB / 2), 0.0)
+        centre = (middle[0], middle[1], BASKET_TOP - BASKET_SLAB / 2)
+        box_body(self.client, (half[0], half[1], BASKET_SLAB / 2), centre)
         for obstacle in instance.obstacles:
             low, high = np.array(obstacle.rectangle.low), np.array(obstacle.rectangle.high)
             middle, half = (low + high) / 2, (high - low) / 2
-            self._box((half[0], half[1], obstacle.top / 2), (middle[0], middle[1], obstacle.top / 2), 0.0)
+            box_body(self.client, (half[0], half[1], obstacle.top / 2), (middle[0], middle[1], obstacle.top / 2))
         self.bodies = {
-            box.name: self._box((box.width / 2, box.length / 2, box.height / 2), (0, 0, -1.0 - number), MASS)
+            box.name: box_body(
+                self.client, (box.width / 2, box.length / 2, box.height / 2), (0, 0, -1.0 - number), MASS
+            )
             for number, box in enumerate(instance.boxes)
         }
-
-    def _box(self, half: tuple[float, float, float], centre: tuple[float, float, float], mass: float) -> int:
-        shape = engine.createCollisionShape(
-            engine.GEOM_BOX, halfExtents=[float(v) for v in half], physicsClientId=self.client
-        )
-        return int(engine.createMultiBody(mass, shape, -1, [float(v) for v in centre], physicsClientId=self.client))
 
     def close(self) -> None:
         """Disconnect; the table cannot be used afterwards."""

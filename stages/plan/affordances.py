@@ -10,7 +10,6 @@ from scenewright.stages.kit.motion.kinematics import reach, shoulder_height
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.world import FRICTION, GRAVITY
 from scenewright.stages.kit.tasks.strips import Atom
-from scenewright.stages.plan.regions import Region
 from scenewright.stages.plan.world_model import WorldModel
 
 LAYOUT = ("floor", "wall", "ceiling")
@@ -70,7 +69,7 @@ def _of_item(model: WorldModel, name: str, size_uncertainty: float) -> set[Atom]
 def _of_support(model: WorldModel, name: str, feet: dict[str, tuple[float, float]]) -> set[Atom]:
     atoms: set[Atom] = set()
     for region in model.regions(name):
-        if not region.carries_things or not within_height(model, _height(model, region)):
+        if not region.carries_things or not within_height(model, model.height_of(region)):
             continue
         fitting = [item for item, (radius, height) in feet.items() if item != name and region.takes(radius, height)]
         if not fitting:
@@ -86,11 +85,6 @@ def _of_support(model: WorldModel, name: str, feet: dict[str, tuple[float, float
             if within_height(model, float(handle[2])):
                 atoms.add(("reachable", joint.name))
     return atoms
-
-
-def _height(model: WorldModel, region: Region) -> float:
-    middle = np.array([*(region.low + region.high) / 2, region.level])
-    return float(apply(model.world_from_region(region), middle)[2])
 
 
 def has_rim(model: WorldModel, item: str, uncertainty: float) -> bool:

@@ -124,7 +124,7 @@ STAGE = Stage(
     },
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
-    versions="segmenter_identity",
+    versions=".kit.acting.eyes.identity",
     data_files=plan_files,
     check=check_options,
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "

@@ -57,7 +57,7 @@ def sample_placements(
     bottom = model.foot(item)
     regions = place_regions(model, item, target, door)
     turns: list[list[Placement]] = []
-    for region in sorted(regions, key=lambda region: abs(_height(model, region) - COMFORT)):
+    for region in sorted(regions, key=lambda region: abs(model.height_of(region) - COMFORT)):
         world_from_closed = model.world_from_region(region)
         low, high = region.low + 0.9 * radius, region.high - 0.9 * radius
         places = []
@@ -90,11 +90,6 @@ def untaken(model: WorldModel, item: str, target: str, places: list[Placement]) 
                 free.append(replace(place, world_from_item=pose))
                 break
     return free
-
-
-def _height(model: WorldModel, region: Region) -> float:
-    middle = np.array([*(region.low + region.high) / 2, region.level])
-    return float(apply(model.world_from_region(region), middle)[2])
 
 
 def placement_style(

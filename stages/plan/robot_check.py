@@ -16,8 +16,8 @@ from scenewright.stages.kit.motion.collision import CollisionChecker
 from scenewright.stages.kit.motion.kinematics import arm_chain, inverse_kinematics, random_starts, reach
 from scenewright.stages.kit.simulation.robot import Configuration, Robot
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
-from scenewright.stages.kit.simulation.shapes import link_shapes
-from scenewright.stages.kit.simulation.urdf_split import mesh_file, read_urdf, with_absolute_meshes
+from scenewright.stages.kit.simulation.robot_shapes import points_at_tool
+from scenewright.stages.kit.simulation.urdf_split import mesh_file, read_urdf
 from scenewright.stages.kit.simulation.world import PhysicsWorld
 
 SAMPLES = 400
@@ -225,7 +225,7 @@ def _gripper(robot: RobotDescription, urdf: Urdf) -> tuple[Gripper, list[str]]:
     problems, axis = [], "xyz"[int(np.argmax(np.abs(apart)))]
     hand = tool_from_world @ shut[robot.hand_link]
     behind = float(-hand[2, 3])
-    gap = _gap(robot, shut, tool_from_world)
+    gap = _gap(robot)
     if length < 0.9 * robot.opening:
         problems.append(
             f"gripper: at opening {1000 * robot.opening:.0f} mm the fingers are {1000 * length:.0f} mm further apart "
@@ -244,17 +244,12 @@ def _gripper(robot: RobotDescription, urdf: Urdf) -> tuple[Gripper, list[str]]:
     return Gripper(robot.opening, axis, gap, behind), problems
 
 
-def _gap(robot: RobotDescription, poses: dict[str, np.ndarray], tool_from_world: np.ndarray) -> float:
+def _gap(robot: RobotDescription) -> float:
     """Return the room between the closed fingers along y of the tool [m]."""
-    shapes = link_shapes(with_absolute_meshes(read_urdf(robot.urdf), robot.urdf.parent))
-    spans = []
-    for link in robot.finger_links:
-        points = [apply(tool_from_world @ poses[link], mesh.vertices)[:, 1] for mesh in shapes[link]]
-        if not points:
-            return 0.0
-        along = np.concatenate(points)
-        spans.append((float(along.min()), float(along.max())))
-    spans.sort()
+    fingers = points_at_tool(robot, robot.finger_links, 0.0)
+    if not all(map(len, fingers)):
+        return 0.0
+    spans = sorted((float(points[:, 1].min()), float(points[:, 1].max())) for points in fingers)
     return spans[1][0] - spans[0][1]
 
 

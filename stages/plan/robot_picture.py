@@ -13,8 +13,7 @@ from scenewright.stages.kit.formats.link_poses import link_poses
 from scenewright.stages.kit.formats.urdf_file import parse_urdf
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.simulation.robot_description import GROUND_CLEARANCE, RobotDescription
-from scenewright.stages.kit.simulation.shapes import link_shapes
-from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes
+from scenewright.stages.kit.simulation.robot_shapes import robot_shapes
 from scenewright.stages.plan.robot_check import OUT_STEP, UP_STEP, RobotReport
 
 ARM, HAND, BASE, REACHED = "#8f9bab", "#4a5563", "#c9c4b8", "#cfe3d4"
@@ -26,7 +25,7 @@ def draw_robot_check(path: Path, robot: RobotDescription, report: RobotReport) -
     urdf = parse_urdf(robot.urdf)
     values = dict(zip(robot.arm_joints, robot.carry.tolist(), strict=True))
     poses = link_poses(urdf, values | dict.fromkeys(robot.finger_joints, robot.opening / 2))
-    shapes = link_shapes(with_absolute_meshes(read_urdf(robot.urdf), robot.urdf.parent))
+    shapes = robot_shapes(robot)
     mount = np.eye(4)
     mount[2, 3] = robot.pedestal_height
     world = mount @ inverse(poses[robot.arm_base])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import apply, inverse
-from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
+from scenewright.stages.kit.simulation.shapes import body_surface
 from scenewright.stages.plan.scaled_body import scaled_text, shifted_text, with_boxes
 from scenewright.stages.plan.sticking_out import sticking_out
 from scenewright.stages.plan.thing_fit import fit_thing
@@ -36,7 +36,7 @@ class SeenThings:
         believed = _moved_pose(pose, -self._middles.get(name, np.zeros(3)))
         best, shape, surface = None, planned, None
         for candidate in [planned, *([self._learned[name]] if name in self._learned else [])]:
-            candidate_surface = _surface(candidate)
+            candidate_surface = body_surface(candidate, POINTS)
             fit = fit_thing(points, eyes, candidate_surface, believed)
             if best is None or fit.misfit < best.misfit:
                 best, shape, surface = fit, candidate, candidate_surface
@@ -48,7 +48,7 @@ class SeenThings:
                 self._learned[name] = shape
         middle = np.zeros(3)
         if shape != planned:
-            own_points = best.scale * _surface(shape)[0]
+            own_points = best.scale * body_surface(shape, POINTS)[0]
             middle[:2] = (own_points.min(axis=0) + own_points.max(axis=0))[:2] / 2
         self._middles[name] = middle
         return _moved_pose(best.pose, middle), shifted_text(scaled_text(shape, best.scale), -middle)
@@ -59,9 +59,3 @@ def _moved_pose(pose: np.ndarray, shift: np.ndarray) -> np.ndarray:
     moved = pose.copy()
     moved[:3, 3] += pose[:3, :3] @ shift
     return moved
-
-
-def _surface(text: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (N, 3) around a rigid body and their outward normals, its frame."""
-    meshes = [mesh for entries in link_shapes(text).values() for mesh in entries]
-    return surface_points(meshes, POINTS, np.random.default_rng(0))

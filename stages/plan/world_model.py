@@ -17,7 +17,7 @@ from scenewright.stages.kit.acting.query import NOTHING, CollisionQuery, carryin
 from scenewright.stages.kit.geometry.transforms import apply, inverse, quaternion_of, transform_from_quaternion
 from scenewright.stages.kit.motion.doors import body_from_moved
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
-from scenewright.stages.kit.simulation.shapes import joined, link_shapes, surface_points
+from scenewright.stages.kit.simulation.shapes import body_surface, joined, link_shapes
 from scenewright.stages.kit.simulation.world import PhysicsWorld, read_scene_bodies
 from scenewright.stages.plan.joined_bodies import joined_text
 from scenewright.stages.plan.regions import Region, find_regions, region_at
@@ -215,8 +215,7 @@ class WorldModel(BelievedRoom):
     def surface(self, name: str, count: int = 3000) -> tuple[np.ndarray, np.ndarray]:
         """Return (count, 3) points on the surface of a rigid body and their outward normals, body frame."""
         if name not in self._points:
-            meshes = [mesh for entries in link_shapes(self._texts[name]).values() for mesh in entries]
-            self._points[name] = surface_points(meshes, count, np.random.default_rng(0))
+            self._points[name] = body_surface(self._texts[name], count)
         return self._points[name]
 
     def regions(self, name: str) -> tuple[Region, ...]:
@@ -232,6 +231,11 @@ class WorldModel(BelievedRoom):
         if region.joint is None:
             return pose
         return pose @ body_from_moved(region.joint, self.joint_value(region.body, region.joint.name))
+
+    def height_of(self, region: Region) -> float:
+        """Return the height [m] of the middle of a region."""
+        middle = np.array([*(region.low + region.high) / 2, region.level])
+        return float(apply(self.world_from_region(region), middle)[2])
 
     def region_under(self, item: str, body: str) -> Region | None:
         """Return the region of a body on which an item stands, None when it stands on none of them."""

@@ -11,6 +11,7 @@ from scenewright.stages.kit.geometry.transforms import (
     transform_from_quaternion,
     transform_from_yaw,
 )
+from scenewright.stages.kit.simulation.bodies import couple_fingers, links_and_joints
 from scenewright.stages.kit.simulation.engine import engine
 from scenewright.stages.kit.simulation.robot_description import (
     BASE_JOINTS,
@@ -52,12 +53,7 @@ class Robot:
         flags = engine.URDF_USE_SELF_COLLISION  # pairs are chosen below
         self.body_id = world.load_urdf_text(mobile_robot_urdf(description), fixed=True, flags=flags)
         client = world.client
-        self.links: dict[str, int] = {}
-        self.joints: dict[str, int] = {}
-        for index in range(engine.getNumJoints(self.body_id, physicsClientId=client)):
-            info = engine.getJointInfo(self.body_id, index, physicsClientId=client)
-            self.links[info[12].decode()] = index
-            self.joints[info[1].decode()] = index
+        self.links, self.joints = links_and_joints(self.body_id, client)
         self.link_names = {index: name for name, index in self.links.items()}
         arm_links = [self.link_names[self.joints[name]] for name in description.arm_joints]
         self.chain = [PEDESTAL_LINK, description.arm_base, *arm_links]
@@ -74,18 +70,8 @@ class Robot:
                 self.body_id, finger, lateralFriction=FINGER_FRICTION, spinningFriction=0.02, physicsClientId=client
             )
         if description.coupled_fingers:
-            self._couple_fingers()
+            couple_fingers(self.body_id, self.finger_joints, client)
         self._choose_self_collisions()
-
-    def _couple_fingers(self) -> None:
-        """Let one finger move as far as the other, as equal forces alone leave open where both stand."""
-        client = self.world.client
-        first, second = self.finger_joints
-        places = ([0, 1, 0], [0, 0, 0], [0, 0, 0])
-        gear = engine.createConstraint(
-            self.body_id, first, self.body_id, second, engine.JOINT_GEAR, *places, physicsClientId=client
-        )
-        engine.changeConstraint(gear, gearRatio=-1, erp=0.2, maxForce=500, physicsClientId=client)
 
     def _choose_self_collisions(self) -> None:
         """Switch off pairs of links that are near each other along the chain: their shapes overlap by design."""

@@ -105,6 +105,12 @@ def joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     return mesh
 
 
+def body_surface(text: str, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return (count, 3) points around a rigid body of URDF text, its frame [m], and their normals; always the same."""
+    meshes = [mesh for entries in link_shapes(text).values() for mesh in entries]
+    return surface_points(meshes, count, np.random.default_rng(0))
+
+
 def surface_points(
     meshes: list[trimesh.Trimesh], count: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:

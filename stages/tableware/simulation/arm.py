@@ -14,6 +14,7 @@ from scenewright.stages.kit.motion.cartesian import follow, straight_poses
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import ArmChain, arm_chain, forward, inverse_kinematics, random_starts
 from scenewright.stages.kit.motion.timing import sample_times, time_path
+from scenewright.stages.kit.simulation.bodies import couple_fingers, links_and_joints
 from scenewright.stages.kit.simulation.engine import engine
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes, without_visuals
@@ -59,10 +60,7 @@ class Arm:
         # pybullet's base pose is that of the centre of mass, not of the link frame.
         center = BASE + np.array(engine.getDynamicsInfo(self.body_id, -1, physicsClientId=client)[3])
         engine.resetBasePositionAndOrientation(self.body_id, center.tolist(), [0, 0, 0, 1], physicsClientId=client)
-        links, joints = {}, {}
-        for index in range(engine.getNumJoints(self.body_id, physicsClientId=client)):
-            info = engine.getJointInfo(self.body_id, index, physicsClientId=client)
-            links[info[12].decode()], joints[info[1].decode()] = index, index
+        _, joints = links_and_joints(self.body_id, client)
         self.joints = [joints[name] for name in self.description.arm_joints]
         self.fingers = [joints[name] for name in self.description.finger_joints]
         for index in self.fingers:
@@ -70,18 +68,7 @@ class Arm:
                 self.body_id, index, contactStiffness=PAD_STIFFNESS, contactDamping=PAD_DAMPING, physicsClientId=client
             )
         self.touch_with(PAD_FRICTION)
-        gear = engine.createConstraint(
-            self.body_id,
-            self.fingers[0],
-            self.body_id,
-            self.fingers[1],
-            engine.JOINT_GEAR,
-            [0, 1, 0],
-            [0, 0, 0],
-            [0, 0, 0],
-            physicsClientId=client,
-        )
-        engine.changeConstraint(gear, gearRatio=-1, erp=0.2, maxForce=500, physicsClientId=client)
+        couple_fingers(self.body_id, self.fingers, client)
         self.opening = self.description.opening
         self.target = self.description.carry.copy()
         self.put(self.target)

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from scenewright.schemas.errors import BadInput
-from scenewright.stages.kit.formats.link_poses import link_poses
-from scenewright.stages.kit.formats.urdf_file import parse_urdf
-from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
-from scenewright.stages.kit.simulation.shapes import link_shapes
-from scenewright.stages.kit.simulation.urdf_split import read_urdf, with_absolute_meshes
+from scenewright.stages.kit.simulation.robot_shapes import points_at_tool
 from scenewright.stages.tableware.simulation.holds import HAND, JAW_HEIGHT, PAD
 
 SLACK = 0.001
@@ -39,14 +35,9 @@ def fitting_robot(robot: str) -> RobotDescription:
 def tips(robot: RobotDescription) -> tuple[float, float, float]:
     """Return of the closed fingers, within JAW_HEIGHT of their tips: the thickness of one, half the width, and how far
     they reach beyond the tool frame [m]."""
-    urdf = parse_urdf(robot.urdf)
-    shapes = link_shapes(with_absolute_meshes(read_urdf(robot.urdf), robot.urdf.parent))
-    poses = link_poses(urdf, dict.fromkeys(robot.finger_joints, 0.0))
-    tool_from_world = inverse(poses[robot.tool_link])
     thickness = half_width = 0.0
     beyond = -np.inf
-    for link in robot.finger_links:
-        points = np.concatenate([apply(tool_from_world @ poses[link], mesh.vertices) for mesh in shapes[link]])
+    for points in points_at_tool(robot, robot.finger_links, 0.0):
         beyond = max(beyond, float(points[:, 2].max()))
         near = points[points[:, 2] > points[:, 2].max() - JAW_HEIGHT + SLACK]
         thickness = max(thickness, float(np.ptp(near[:, 1])))
