@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from scenewright.stages.agent.obstacle_map import ObstacleMap
-from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
+from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep, Take
 
 
 class Body(Protocol):
@@ -60,13 +60,19 @@ class Body(Protocol):
         """What the hand holds as seen from one of the wrist's views; None: nothing. The same view says the same."""
         ...
 
-    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+    def reaches(self, base: Base, at: Position, *, take: Take = "") -> bool:
         """Whether a collision-free arm pose at the position exists in the robot's own map, from a base pose; to `take`
         what is there a grasp of what was seen of it, where the map holds shapes."""
         ...
 
-    def grasp(self, at: Position, label: str, candidate: int) -> Felt:
-        """Close the hand at a position by the grasp of a rank (0 first). `label`: what is believed to be there."""
+    @property
+    def held_level(self) -> bool:
+        """Whether what it holds, if anything, was taken by a level hand, so that it can go into a shelf."""
+        ...
+
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
+        """Close the hand at a position by the grasp of a rank (0 first), of a `level` hand alone where that is said.
+        `label`: what is believed to be there."""
         ...
 
     def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:

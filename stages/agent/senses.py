@@ -13,6 +13,8 @@ import numpy as np
 from scenewright.schemas.plan import Failure
 
 Position = tuple[float, float, float]
+Take = Literal["", "any", "level"]
+"""Whether something is to be taken, and whether a level hand has to, as for what goes into a shelf."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,8 @@ class SeenFurniture:
     opened: bool
     open_to: float | None = None
     """Heading out of a shelf [rad] whose leaf is open: it is looked and got into from there alone."""
+    levels: tuple[float, ...] = ()
+    """Heights of the boards of an open shelf [m]."""
     top: bool = False
     """Things lie on its top as well: they are got at with its door closed."""
     more: bool = False

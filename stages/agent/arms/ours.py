@@ -22,7 +22,7 @@ from scenewright.stages.agent.exploration import explore
 from scenewright.stages.agent.goals import CARRIERS
 from scenewright.stages.agent.language.values import ObjectMap, Observation, Outcome, SceneObject
 from scenewright.stages.agent.scene_map import ENOUGH, Item, Region, classes_not_of, quarter
-from scenewright.stages.agent.senses import Base, Detection, Position
+from scenewright.stages.agent.senses import Base, Detection, Position, Take
 
 SURE_OF_USE = 2
 """Regions of views by which a thing has to be ahead in being clean or used."""
@@ -284,7 +284,7 @@ class OwnSkills(CommonSkills):
                 return Outcome(True)
         return Outcome(False, "no_way", f"no way to {furniture_key} was found", {"base_poses": len(poses)})
 
-    def _stations(self, place: str, at: Position, *, take: bool = False) -> Iterator[Base]:
+    def _stations(self, place: str, at: Position, *, take: Take = "") -> Iterator[Base]:
         """Yield base poses that reach a position on furniture, first where the robot stands if that will do; a short
         arm explores until one is known. To `take` what is there a grasp of what was seen so far has to be possible,
         or, where none is from anywhere, a pose that reaches shows more, and the next one other sides of it."""
@@ -292,7 +292,7 @@ class OwnSkills(CommonSkills):
         while len(tried) < TRIES:
             fresh = self._fresh(place, at, tried, take)
             if fresh is None and take:
-                take = False
+                take = ""
                 continue
             if fresh is None:
                 if not self._body.short_armed or self._explored:
@@ -304,7 +304,7 @@ class OwnSkills(CommonSkills):
             yield fresh
             take = take_first
 
-    def _fresh(self, place: str, at: Position, tried: list[Base], take: bool) -> Base | None:
+    def _fresh(self, place: str, at: Position, tried: list[Base], take: Take) -> Base | None:
         """Return the nearest base pose that reaches a position and was not tried, nor failed, for it."""
         poses = [(0.0, self._body.base)] if self.scene.in_front(self._body.base) == place else []
         poses += self._before(place)
@@ -357,17 +357,17 @@ class OwnSkills(CommonSkills):
                 message = f"{item.key} looks like a {item.label}, but not from everywhere: also like a {item.disputed}"
                 return Outcome(False, "disputed", message, label=item.disputed)
         furniture_key = item.place
-        outcome = self._take(item)
+        outcome = self._take(item, "any")
         if self.holding is not None and furniture_key in self._patches:
             self.scene.furniture.pop(furniture_key)
         return outcome
 
-    def _take(self, item: Item) -> Outcome:
+    def _take(self, item: Item, how: Take) -> Outcome:
         """Take a thing, by other grasps and from other base poses where one does not do it, and make sure that it is
         held. Nothing is executed that is known to fail, but for one try where nothing else is left: it says why."""
         furniture_key, candidate, tries, executed = item.place, 0, 0, 0
         last: Failure | None = None
-        stations = ((base, False) for base in self._stations(furniture_key, item.position, take=True))
+        stations = ((base, False) for base in self._stations(furniture_key, item.position, take=how))
         last_resort = ((base, True) for _, base in self._before(furniture_key)[:1])
         for base, desperate in chain(stations, last_resort):
             if (executed and desperate) or (tries and not self._use.repair):
@@ -376,12 +376,12 @@ class OwnSkills(CommonSkills):
             if not self._there(base, furniture_key):
                 continue
             asks = self._use.reachability and self._use.repair and not desperate
-            if asks and not self._body.reaches(self._body.base, item.position, take=True):
+            if asks and not self._body.reaches(self._body.base, item.position, take=how):
                 self._remember_failure(furniture_key, base, item.position)
                 continue
             while executed < TRIES:
                 executed += 1
-                felt = self._body.grasp(item.position, item.label, candidate)
+                felt = self._body.grasp(item.position, item.label, candidate, level=how == "level")
                 if not felt.ok:
                     last = felt.failure
                     self._remember_failure(furniture_key, self._body.base, item.position)
@@ -489,9 +489,22 @@ class OwnSkills(CommonSkills):
     def place(self, target: SceneObject) -> Outcome:
         """Put down what is held, on a carrier or on free spots of furniture, and make sure that it lies there."""
         furniture_key, label, at = self.places_on(target)
+        if self.scene.furniture[furniture_key].levels and not self._body.held_level:
+            outcome = self._take_from_the_side()
+            if not outcome.ok:
+                return outcome
         if self._use.memory:
             at = [p for p in at if not any(hypot(p[0] - q[0], p[1] - q[1]) < OFF_SPOT for q in self._off)] or at
         return self.place_at(furniture_key, label, at[:: max(1, len(at) // TRIES)])
+
+    def _take_from_the_side(self) -> Outcome:
+        """Put what the hand came down on back to where it was, and take it from the side: so it goes into a shelf."""
+        item = self.holding
+        assert item is not None
+        if item.place not in self.scene.furniture:
+            return Outcome(False, "unreachable", f"{item.key} goes into a shelf by a level hand alone")
+        back = self.place_at(item.place, self.scene.furniture[item.place].label, [item.position])
+        return self._take(item, "level") if back.ok else back
 
     def place_at(self, place: str, label: str, at: list[Position]) -> Outcome:
         """Try the positions, each from base poses that reach it."""

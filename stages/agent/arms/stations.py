@@ -14,6 +14,9 @@ FINE = 0.03
 """Distance between positions around a middle, and of one from the rim of what is known to stand near [m]; by eye."""
 RING = 0.5
 """Share of the radius of a small carrier at which things are put on it; by eye."""
+BEHIND_EDGE, ONE_BOARD, COMFORT = 0.13, 0.15, 0.8
+"""Distance of a spot in a shelf from its front, height over a board within which things are on it, and the height that
+the arm likes [m]; by eye."""
 INSIDE = 0.2
 """Distance of a spot from the edge over which it is placed [m]; by eye."""
 
@@ -72,6 +75,8 @@ def drivable(scene: SceneMap, base: Base, poses: list[Base]) -> list[tuple[float
 def spots(scene: SceneMap, place: str, base: Base, apart: float = 0.18) -> list[Position]:
     """Return positions on furniture that are free as far as is known, the nearest to the base first."""
     piece = scene.furniture[place]
+    if piece.levels and piece.open_to is not None:
+        return _spots_in_shelf(scene, place, piece, piece.open_to, apart)
     steps = [
         [c - s / 2 + INSIDE + k * apart for k in range(max(1, int((s - 2 * INSIDE) / apart) + 1))]
         for c, s in zip(piece.centre, piece.size, strict=True)
@@ -84,6 +89,22 @@ def spots(scene: SceneMap, place: str, base: Base, apart: float = 0.18) -> list[
         if all(hypot(x - p[0], y - p[1]) > r + 0.1 for p, r in occupied)
     ]
     return sorted(free, key=lambda p: hypot(p[0] - base.x, p[1] - base.y))
+
+
+def _spots_in_shelf(scene: SceneMap, place: str, piece: SeenFurniture, open_to: float, apart: float) -> list[Position]:
+    """Return positions near the front of a shelf's boards that are free as far as is known, those first that the arm
+    gets to best. `open_to`: heading out of it [rad]."""
+    out, along = (cos(open_to), sin(open_to)), (-sin(open_to), cos(open_to))
+    depth, width = (sum(abs(a) * s for a, s in zip(axis, piece.size, strict=True)) for axis in (out, along))
+    before, count = depth / 2 - min(BEHIND_EDGE, depth / 2), max(0, int((width / 2 - INSIDE) / apart))
+    free = []
+    for level in sorted(piece.levels, key=lambda level: abs(level - COMFORT)):
+        lying = [i for i in scene.items.values() if i.place == place and abs(i.position[2] - level) < ONE_BOARD]
+        for k in sorted(range(-count, count + 1), key=abs):
+            x, y = (c + before * o + k * apart * a for c, o, a in zip(piece.centre, out, along, strict=True))
+            if all(hypot(x - i.position[0], y - i.position[1]) > i.radius + 0.1 for i in lying):
+                free.append((x, y, level + 0.02))
+    return free
 
 
 def spots_on(scene: SceneMap, carrier: Item) -> list[Position]:

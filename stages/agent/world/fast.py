@@ -11,7 +11,7 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 from scenewright.schemas.apartment import Apartment, Furniture, Thing
 from scenewright.stages.agent.obstacle_map import ObstacleMap
-from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep
+from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, SeenFurniture, Sweep, Take
 from scenewright.stages.agent.world.events import Event, EventLog
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.floor import Floor
@@ -58,7 +58,7 @@ class Body:
 class FastWorld:
     """One episode's world. `sought`: classes that the eyes are prompted with; `floor`: if it is worked out already."""
 
-    same_thing, stand_off, short_armed = 0.04, 0.45, False
+    same_thing, stand_off, short_armed, held_level = 0.04, 0.45, False, True
 
     def __init__(
         self, apartment: Apartment, sought: tuple[str, ...], rates: Rates, seed: int, floor: Floor | None = None
@@ -146,7 +146,7 @@ class FastWorld:
             label, self._hand_position(), body_in_hand.thing.color, body_in_hand.thing.radius, body_in_hand.thing.used
         )
 
-    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+    def reaches(self, base: Base, at: Position, *, take: Take = "") -> bool:
         """Whether the arm gets there: by distance and height, and as far as a bad base pose can be foreseen; nothing
         here has a shape to `take` it by."""
         if not self._in_reach(base, at):
@@ -158,7 +158,7 @@ class FastWorld:
         foreseen = self._luck.happens(self._rates.foreseen, "foreseen", *key)
         return not (foreseen and self._luck.happens(self._rates.base, "base", *key))
 
-    def grasp(self, at: Position, label: str, candidate: int) -> Felt:
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
         """Take what is nearest to a position. A slip and a wrong thing are not felt."""
         self._seconds += SECONDS["grasp"]
         body, piece = self._at(at), self._under(at)

@@ -90,4 +90,4 @@ def _identity(entry: Believed) -> object:
     if not isinstance(entry, Front):
         return (*np.round(entry[0], 3).tolist(), *np.round(entry[1], 3).tolist())
     pose = tuple(np.round(entry.map_from_front, 3).ravel().tolist())
-    return (pose, entry.size, entry.panel, entry.bar, round(entry.value, 3), entry.floor)
+    return (pose, entry.size, entry.panel, entry.bar, round(entry.value, 3), entry.floor, entry.levels)

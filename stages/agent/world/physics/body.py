@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from scenewright.schemas.apartment import Furniture
-from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep
+from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep, Take
 from scenewright.stages.agent.world.events import Event
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.physics.driving import Driving
@@ -89,13 +89,18 @@ class PhysicsBody:
         """See what the hand holds."""
         return self._looking.look_at_hand(view)
 
-    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+    def reaches(self, base: Base, at: Position, *, take: Take = "") -> bool:
         """Whether a free arm pose over a position exists in the robot's own map, or a grasp of what was seen there."""
         return self._handling.reaches(base, at, take=take)
 
-    def grasp(self, at: Position, label: str, candidate: int) -> Felt:
+    @property
+    def held_level(self) -> bool:
+        """Whether what it holds was taken by a level hand."""
+        return self._handling.held_level
+
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
         """Take what was seen at a position."""
-        return self._handling.grasp(at, label, candidate)
+        return self._handling.grasp(at, label, candidate, level=level)
 
     def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
         """Let go over a position."""

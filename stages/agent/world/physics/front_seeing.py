@@ -21,13 +21,15 @@ from scenewright.stages.agent.world.physics.fronts import (
     Front,
     edges,
 )
+from scenewright.stages.agent.world.physics.head import SHELVES
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.doors import body_from_moved
 
-SHELVES = ("shelf",)
 INNER, SHOWS_INSIDE = 0.08, 0.3
 """Distance from the outside from which on something is inside of furniture [m], and the least share of a shelf's front
 through which something was seen there; by eye."""
+BOARD_SHARE = 0.3
+"""Share of the fullest height's cubes from which on another height is a board's; by eye."""
 FRONT_CELL = 0.04
 """Edge of a cell of a front in which that is told [m], as large as those in which furniture is kept."""
 OPEN = 1.5
@@ -80,16 +82,37 @@ def fronts_seen(name: str, label: str, box: Box, surfaces: Sequence[Surface], ba
 def open_shelf(name: str, label: str, box: Box, points: np.ndarray, base: np.ndarray) -> Front | None:
     """Return the open side, towards a base pose (3,), of a shelf in a box of which points (N, 3) were seen; None where
     little of its inside was: it is shut, or a plain block."""
+    if label not in SHELVES:
+        return None
     (low, high), across = box, int((box[1] - box[0])[:2].argmin())
     normal = np.zeros(2)
     normal[across] = 1.0 if base[across] > (low + high)[across] / 2 else -1.0
-    if label not in SHELVES or _seen_through(box, points, across, normal[across]) < SHOWS_INSIDE:
+    levels = levels_seen(box, points)
+    if len(levels) < 2 and _seen_through(box, points, across, normal[across]) < SHOWS_INSIDE:
         return None
     frame = transform_from_yaw(atan2(normal[1], normal[0]), np.array([*((low + high)[:2] / 2), 0.0]))
     depth, width, top = (float(value) for value in ((high - low)[across], (high - low)[1 - across], high[2]))
     corner = (depth / 2, width / 2, LEAF)
     panel = (-width / 2, width / 2, LEAF, top)
-    return Front(name, label, frame, (depth, width, top), panel, (corner, corner), False, OPEN, leafless=True)
+    bar = (corner, corner)
+    return Front(name, label, frame, (depth, width, top), panel, bar, False, OPEN, leafless=True, levels=levels)
+
+
+def levels_seen(box: Box, points: np.ndarray) -> tuple[float, ...]:
+    """Return the heights [m] of the boards of a shelf in a box of which points (N, 3) were seen, one a cube: those at
+    which most of them lie, its sides and what is near its front and back aside."""
+    low, high = box
+    within = np.all((points[:, :2] > low[:2] + INNER) & (points[:, :2] < high[:2] - INNER), axis=1)
+    heights, counts = np.unique(np.round(points[within, 2], 3), return_counts=True)
+    levels: list[list[tuple[float, int]]] = []
+    for height, count in zip(heights.tolist(), counts.tolist(), strict=True):
+        if count < BOARD_SHARE * counts.max():
+            continue
+        if levels and height - levels[-1][-1][0] < 1.5 * FRONT_CELL:
+            levels[-1].append((height, count))
+        else:
+            levels.append([(height, count)])
+    return tuple(round(sum(h * n for h, n in level) / sum(n for _, n in level), 3) for level in levels)
 
 
 def _seen_through(box: Box, points: np.ndarray, across: int, side: float) -> float:

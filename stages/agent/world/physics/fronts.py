@@ -46,6 +46,8 @@ NARROWEST = 0.25
 """Least width of a front that was looked at, and not its edge [m]; by eye."""
 EDGE_CELL = 0.01
 """Edge of a cell on which a front's outline is told [m]; by eye."""
+ABOUT, BOARD = 0.015, 0.035
+"""The top of a shelf's board is known to so much, and its underside is so far below it, as believed [m]; by eye."""
 GAP = 0.005
 """Room between what moves and its neighbours [m]; by eye."""
 TRAY = 0.5
@@ -73,6 +75,8 @@ class Front:
     """Height on which things inside lie, as seen [m]."""
     leafless: bool = False
     """An open shelf: nothing moves, it is always open."""
+    levels: tuple[float, ...] = ()
+    """Heights of the boards of an open shelf, as seen [m], the lowest first."""
     across: tuple[float, float] | None = None
     """From y to y of the whole furniture, where this is one of several fronts; the rest of it is taken for solid."""
 
@@ -124,6 +128,7 @@ class Front:
             *(slab(low, high) for low, high in self.solid()),
         ]
         low, high = np.array(self.bar[0]) - ROOM, np.array(self.bar[1]) + ROOM
+        still += [slab((-x, -w, level - BOARD), (inner, w, level - ABOUT)) for level in self.levels]
         if self.leafless:  # a speck within its back
             return jointed_text(self.name, tuple(still), (slab((-x, 0.0, 0.0), (0.002 - x, 0.002, 0.002)),), self.joint)
         moving = [slab((inner, y0, z0), (x, y1, z1 + OVER)), slab(as_vector(low), as_vector(high))]
@@ -167,6 +172,11 @@ class Front:
             & (in_front_frame[:, 2] > self.low)
             & (in_front_frame[:, 2] < (self.size[2] - 0.05 if self.alone else self.panel[3]))
         )
+
+    @property
+    def inward(self) -> float:
+        """Heading straight into it [rad]."""
+        return float(np.arctan2(*-self.map_from_front[1::-1, 0]))
 
     def behind(self, at: np.ndarray) -> float:
         """Return how far a point (3,) of the map is behind the open front of a shelf [m]; 0 in a drawer, which is open

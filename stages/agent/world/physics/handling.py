@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import hypot
 
 import numpy as np
-from scenewright.stages.agent.senses import Base, Felt, Position
+from scenewright.stages.agent.senses import Base, Felt, Position, Take
 from scenewright.stages.agent.world.physics.eyes import Surface
+from scenewright.stages.agent.world.physics.grasps import LEVEL
 from scenewright.stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
 from scenewright.stages.agent.world.physics.letting_go import DROP, JUST_OVER, SOME_WAY_OVER, Spot, plan_release
 from scenewright.stages.agent.world.physics.looking import Looking
@@ -28,7 +30,7 @@ class Handling:
     def __init__(self, robot: RobotInRoom, seen: Seen, looking: Looking) -> None:
         self._robot, self._seen, self._looking = robot, seen, looking
 
-    def reaches(self, base: Base, at: Position, *, take: bool = False) -> bool:
+    def reaches(self, base: Base, at: Position, *, take: Take = "") -> bool:
         """Whether a free arm pose over a position exists in the robot's own map, from a base pose; to `take` what was
         seen there a grasp of it, from where it stands as seen from there."""
         self._robot.beliefs.hold(None)
@@ -38,13 +40,19 @@ class Handling:
             return False
         if take and base == self._robot.base:
             self._see_from_here(at)
-        target = self._target(at, 0, base) if take else None
+        target = self._target(at, 0, base, level=take == "level") if take else None
         if target is not None:
             return graspable(self._robot.beliefs, pose, target, _chance(0))
         self._robot.beliefs.show(self._seen.boxes(at, base))
         return reachable(self._robot.beliefs, pose, at, np.random.default_rng(5), forward=forward)
 
-    def grasp(self, at: Position, label: str, candidate: int) -> Felt:
+    @property
+    def held_level(self) -> bool:
+        """Whether what it holds, if anything, was taken by a level hand."""
+        hold = self._robot.hold
+        return hold is None or float(-hold.rotation[2, 2]) < np.sin(LEVEL)
+
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
         """Take the surface that was seen at a position. A slip and a wrong thing are not felt."""
         meant = self._nearest_thing(at)
         step = f"grasp {meant}" if meant and self._robot.room.things[meant].label == label else f"grasp a {label}"
@@ -52,7 +60,7 @@ class Handling:
             self._robot.log.done("grasp", step, False, "api", "")
             return Felt(False, "no_grasp")
         try:
-            self._take(at, candidate)
+            self._take(at, candidate, level=level)
         except MotionFailed as failed:
             self._robot.draw_in()
             self._robot.log.done("grasp", step, False, "grasp", "")
@@ -76,10 +84,10 @@ class Handling:
         if self._seen.nearest(at) is None:
             self._seen.surfaces = before
 
-    def _take(self, at: Position, candidate: int) -> None:
+    def _take(self, at: Position, candidate: int, *, level: bool) -> None:
         self._see_from_here(at)
         self._robot.beliefs.hold(None)
-        target = self._target(at, candidate)
+        target = self._target(at, candidate, level=level)
         if target is None:
             raise MotionFailed("no_grasp", "no surface was seen there")
         motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, _chance(candidate))
@@ -103,7 +111,7 @@ class Handling:
             self._robot.hold = None
             self._robot.driver.held = None
 
-    def _target(self, at: Position, rank: int, base: Base | None = None) -> Target | None:
+    def _target(self, at: Position, rank: int, base: Base | None = None, *, level: bool = False) -> Target | None:
         """Return what was seen nearest to a position, and show the arm what is around a base pose, the robot's own if
         none is given; None where nothing was seen."""
         surface = self._seen.nearest(at)
@@ -120,9 +128,8 @@ class Handling:
             measured = front.floor if one or _near(front.floor, surface) else None
         floor = 0.0 if at[2] < FLOOR else float(surface.low[2]) if measured is None else measured
         if front is None:
-            return Target(surface, f"thing_{number}", rank, floor)
-        inward = float(np.arctan2(*-front.map_from_front[1::-1, 0]))
-        return Target(surface, f"thing_{number}", rank, floor, front.behind(surface.middle), inward)
+            return Target(surface, f"thing_{number}", rank, floor, level=level)
+        return Target(surface, f"thing_{number}", rank, floor, front.behind(surface.middle), front.inward)
 
     def _close_hand(self) -> None:
         tool = self._robot.driver.robot.tool_pose()[:3, 3]
@@ -153,7 +160,10 @@ class Handling:
             return Felt(True)
         support = self._seen.support(at)
         around, beside = self._seen.boxes(), self._seen.boxes(at)
-        spot = Spot((at[0], at[1], support), self._seen.rim(at, support), around, beside, self._seen.beside_on(at))
+        nestled, front = self._seen.beside_on(at), self._seen.front_at(at)
+        spot = Spot((at[0], at[1], support), self._seen.rim(at, support), around, beside, nestled)
+        if front is not None and front.levels:
+            spot = replace(spot, behind=front.behind(np.array(spot.at)), inward=front.inward)
         try:
             self._let_go(self._way_down(spot, (JUST_OVER, SOME_WAY_OVER) if gently else (DROP,)), gently)
         except MotionFailed as failed:

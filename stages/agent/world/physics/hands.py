@@ -62,6 +62,8 @@ class Target:
     """How far behind an open front it stands [m]: the hand goes in and comes out straight."""
     inward: float = 0.0
     """Heading that goes straight into that front [rad]."""
+    level: bool = False
+    """It will go into a shelf: the hand comes from the side."""
 
 
 @dataclass(frozen=True)
@@ -143,14 +145,16 @@ def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
     keep = _inside(surface)
     points, normals = surface.points[keep], surface.normals[keep]
     inside, heading = target.behind > 0, np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    pitches = FORWARD_PITCHES if inside else PITCHES
+    pitches = FORWARD_PITCHES if inside or target.level else PITCHES
     for margin in (MARGIN, TIGHT):
         grasps = antipodal_grasps(points, normals, jaws, target.floor, pitches, margin)
         grasps = within_reach(grasps, target.inward, STRAIGHT) if inside else within_reach(grasps, heading)
         if grasps:
             break
     # what is too wide for the fingers may have a rim: a bowl, a pot, a large cup
-    over_rim = [] if inside or margin == MARGIN else rim_grasps(points, np.eye(4), np.random.default_rng(0))
+    over_rim = (
+        [] if inside or target.level or margin == MARGIN else rim_grasps(points, np.eye(4), np.random.default_rng(0))
+    )
     walls = [grasp.body_from_tool for grasp in over_rim]  # the near one first: few are tried, and not all are in reach
     return grasps + sorted(walls, key=lambda pose: float(np.hypot(*(pose[:2, 3] - base[:2]))))
 

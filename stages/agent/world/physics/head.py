@@ -28,6 +28,7 @@ JUMP = 0.06
 By eye."""
 GRAIN = 0.04
 """Edge of the cubes in which furniture is kept [m]; by eye."""
+SHELVES = ("shelf",)
 TOP_SHARE = 0.3
 """Share of the fullest level's cubes: the highest level that has as many is the top; above it are strays at the rims of
 things that stand there. By eye."""
@@ -93,7 +94,8 @@ class SeenPiece:
             points = points[clusters(points, 0.2) == 0]
             low, high = np.percentile(points, 1, axis=0), np.percentile(points, 99, axis=0)
             levels, counts = np.unique(points[:, 2], return_counts=True)
-            high[2] = levels[counts >= TOP_SHARE * counts.max()].max()
+            if self.label not in SHELVES:  # whose boards are no tops
+                high[2] = levels[counts >= TOP_SHARE * counts.max()].max()
             top = points[np.abs(points[:, 2] - high[2]) < 1.5 * GRAIN, :2]
             if len(top) >= LEAST:  # what stands there is as wide as its top
                 low[:2], high[:2] = np.percentile(top, 2, axis=0), np.percentile(top, 98, axis=0)

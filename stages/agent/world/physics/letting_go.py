@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.stages.agent.world.physics.beliefs import HELD, Beliefs, Believed, Hold
-from scenewright.stages.agent.world.physics.hands import SAMPLES, SLOW, Motion, pointing
+from scenewright.stages.agent.world.physics.hands import CLEAR, LIFT_INSIDE, SAMPLES, SLOW, Motion, pointing
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.cartesian import raised
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -25,6 +25,8 @@ SOME_WAY_OVER = 0.06
 """Height at which ours does where the hand has no room farther down [m]."""
 TURNS = tuple((turn, tilt) for tilt in (0.0, 0.45) for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6))
 """How the hand is turned about the vertical, and leaned away from the robot where it gets no farther upright [rad]."""
+INTO_TURNS = ((0.0, 0.0), (0.3, 0.0), (-0.3, 0.0))
+"""The same of a hand that goes into a shelf."""
 NESTLES = 0.015
 """Boxes of round things are so much wider than they are [m]: fruit may lie that near to fruit."""
 
@@ -43,6 +45,10 @@ class Spot:
     """The same without what covers the spot, which the hand comes down into."""
     nestled: tuple[str, ...]
     """What lies beside it on the same carrier: what is held may come down against it."""
+    behind: float = 0.0
+    """How far behind the front of an open shelf it is [m]: the hand comes and goes straight."""
+    inward: float = 0.0
+    """Heading straight into that front [rad]."""
 
 
 def plan_release(
@@ -57,7 +63,8 @@ def plan_release(
     """Return the motion that lets go with the foot of what is held `height` [m] over a spot: to over the rim around it,
     straight down, and back. Raises MotionFailed with what ended most attempts.
     """
-    at, up = spot.at, max(UP, spot.rim + OVER_RIM - spot.at[2] - height)
+    at, inside = spot.at, spot.behind > 0
+    up = LIFT_INSIDE if inside else max(UP, spot.rim + OVER_RIM - spot.at[2] - height)
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     opening, carry = beliefs.description.opening, beliefs.description.carry
     foot = hold.foot if hold is not None else 0.0
@@ -65,24 +72,33 @@ def plan_release(
     beliefs.robot.set(Configuration(base, arm, opening))
     beliefs.show(spot.beside)
     planner = planner.under(replace(held, rests_on=dict.fromkeys(spot.nestled, NESTLES)))
-    heading = float(np.arctan2(at[1] - base[1], at[0] - base[0]))
+    heading = spot.inward if inside else float(np.arctan2(at[1] - base[1], at[0] - base[0]))
+    clear = spot.behind + CLEAR + (float(hold.size[:2].max()) if hold is not None else 0.0)
     try:
-        for turn, tilt in TURNS:
+        for turn, tilt in INTO_TURNS if inside else TURNS:
             pose = _tilt(_tool_rotation(hold, heading, turn), heading, tilt)
             pose[:3, 3] = (at[0], at[1], at[2] + height + foot)
             down = planner.straight(base, pose, raised(pose, up), tally, starts=3)
             if down is None:
                 continue
+            come, away = down[-1:], down
+            if inside:
+                out = planner.line(base, down[-1], _moved_out(raised(pose, up), clear), tally)
+                off = None if out is None else planner.line(base, down[0], _moved_out(pose, clear), tally)
+                if out is None or off is None:
+                    continue
+                come, away = out[::-1], off
             beliefs.show(spot.around)
             try:
-                reach = planner.path(base, arm, down[-1])
-                back = planner.path(base, down[-1], carry)
+                reach = planner.path(base, arm, come[0])
+                back = planner.path(base, away[-1], carry)
             except MotionFailed as failed:
                 tally.failed(failed)
                 break
+            there = Segment(whole_body(base, np.concatenate([reach, come[1:]])), 0.0, SLOW if inside else 0.6)
             return Motion(
-                (Segment(whole_body(base, reach), 0.0, 0.6), Segment(whole_body(base, down[::-1]), 0.0, SLOW)),
-                (Segment(whole_body(base, down), opening, SLOW), Segment(whole_body(base, back), opening)),
+                (there, Segment(whole_body(base, down[::-1]), 0.0, SLOW)),
+                (Segment(whole_body(base, away), opening, SLOW), Segment(whole_body(base, back), opening)),
             )
         tally.raise_for("place", (HELD,))
     finally:
@@ -103,6 +119,13 @@ def _tool_rotation(hold: Hold | None, heading: float, turn: float) -> np.ndarray
     pose = np.eye(4)
     pose[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ hold.rotation
     return pose
+
+
+def _moved_out(pose: np.ndarray, distance: float) -> np.ndarray:
+    """Return a tool pose (4, 4) moved level against where the hand points [m]."""
+    moved = pose.copy()
+    moved[:2, 3] -= distance * pose[:2, 2] / max(float(np.hypot(*pose[:2, 2])), 1e-6)
+    return moved
 
 
 def _tilt(pose: np.ndarray, heading: float, tilt: float) -> np.ndarray:

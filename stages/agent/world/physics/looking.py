@@ -72,6 +72,8 @@ class Looking:
                 if of_furniture.sum() >= head.LEAST:
                     head.enter(self._seen.pieces, entry.label, points[of_furniture])
             self._robot.seconds_aside += PICTURE_SECONDS
+        for number in range(len(self._seen.pieces)):
+            self._seen.keep_shelf(number)
         free, occupied = head.cells_of(np.concatenate(clouds), apply(map_from_true, eye[None])[0])
         sweep = Sweep(free, occupied, tuple(self._seen.furniture()))
         self._seen.obstacles.add(sweep)

@@ -79,6 +79,7 @@ class Seen:
             piece.label in (*WITH_DRAWERS, *WITH_LEAVES, *OF_EITHER),
             opened,
             outward,
+            () if front is None else front.levels,
             piece.label in OF_EITHER,
             bool(self.waiting.get(f"furniture_{number}")),
         )
@@ -238,10 +239,10 @@ class Seen:
             close_points = np.hypot(*(surface.points[:, :2] - at[:2]).T) < 0.035
             if close_points.sum() > 5:
                 return float(np.median(surface.points[close_points, 2]))
-        piece = self.piece_at(at)
-        if piece is None:
-            return at[2]
-        return self.pieces[piece].top
+        piece, front = self.piece_at(at), self.front_at(at)
+        if front is not None and front.levels:
+            return min(front.levels, key=lambda level: abs(level - at[2]))
+        return at[2] if piece is None else self.pieces[piece].top
 
 
 def too_wide(surface: Surface) -> bool:
