@@ -489,6 +489,9 @@ class OwnSkills(CommonSkills):
     def place(self, target: SceneObject) -> Outcome:
         """Put down what is held, on a carrier or on free spots of furniture, and make sure that it lies there."""
         furniture_key, label, at = self.places_on(target)
+        if self._use.other_sides and furniture_key not in self._stood and self.navigate(target).ok:
+            self._look(furniture_key)  # what stands there was not seen yet
+            furniture_key, label, at = self.places_on(target)
         if self.scene.furniture[furniture_key].levels and not self._body.held_level:
             outcome = self._take_from_the_side()
             if not outcome.ok:

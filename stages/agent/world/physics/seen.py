@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import hypot
 
 import numpy as np
+from scenewright.schemas.base import as_vector
 from scenewright.stages.agent.obstacle_map import ObstacleMap
 from scenewright.stages.agent.senses import Base, Position, SeenFurniture
 from scenewright.stages.agent.world.physics import head
@@ -149,6 +150,7 @@ class Seen:
             counts, edges = np.histogram(heights, bins=np.arange(high[2] - 0.08, high[2] + 0.081, 0.005))
             top = edges[counts.argmax()] + 0.0025
             self.pieces[piece].measured_top = float(np.median(heights[np.abs(heights - top) < 0.006]))
+            self.pieces[piece].keep_bare(points[inside & (np.abs(points[:, 2] - top) < 0.012)])
 
     def piece_at(self, at: Position) -> int | None:
         """Return the number of the piece at a position, with a hand's breadth around it; None for the floor."""
@@ -220,8 +222,14 @@ class Seen:
         return boxes
 
     def taken(self, at: Position) -> bool:
-        """Whether something stands at a position that is no thing and on which nothing is put."""
-        return any(_covers(surface, at) and surface.label == FIXTURE for surface in self.surfaces)
+        """Whether something stands at a position that is no thing and on which nothing is put. Of that only the near
+        side is seen: on furniture with such a thing the top itself has to have been."""
+        fixtures = [surface for surface in self.surfaces if surface.label == FIXTURE]
+        piece = self.piece_at(at)
+        if piece is None or any(_covers(surface, at) for surface in fixtures):
+            return any(_covers(surface, at) for surface in fixtures)
+        there = any(self.piece_at(as_vector(surface.middle)) == piece for surface in fixtures)
+        return there and self.front_at(at) is None and not self.pieces[piece].bare_at(at[0], at[1])
 
     def beside_on(self, at: Position) -> tuple[str, ...]:
         """Return the names, as of `boxes`, of what lies on the thing that covers a position."""
