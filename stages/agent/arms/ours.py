@@ -16,7 +16,7 @@ import numpy as np
 from scenewright.schemas.plan import Failure
 from scenewright.stages.agent.arms.next_view import ahead_of, best_floor_view, fallen_where, floor_seen, worth
 from scenewright.stages.agent.arms.skills import CommonSkills
-from scenewright.stages.agent.arms.stations import APART, around, corners, drivable, other_sides
+from scenewright.stages.agent.arms.stations import APART, around, corners, drivable, other_sides, spots
 from scenewright.stages.agent.body import Body
 from scenewright.stages.agent.exploration import explore
 from scenewright.stages.agent.goals import CARRIERS
@@ -50,6 +50,8 @@ FLOOR_VIEWS, FLOOR_AT = 4, 1.2
 """Looks at the floor for what fell, and how far before the base they are at [m]."""
 LITTLE = 0.1
 """No look is taken that shows less of where it may lie."""
+CLOSER = (0.09, 0.12)
+"""Distance of spots from each other, and from the edge, where none of the usual ones can be got to [m]; by eye."""
 PULLS = 3
 """Most pulls at one door within one call: where it does not move from there, the rest is not the base pose. By eye."""
 TALL = 1.2
@@ -498,7 +500,11 @@ class OwnSkills(CommonSkills):
                 return outcome
         if self._use.memory:
             at = [p for p in at if not any(hypot(p[0] - q[0], p[1] - q[1]) < OFF_SPOT for q in self._off)] or at
-        return self.place_at(furniture_key, label, at[:: max(1, len(at) // TRIES)])
+        outcome = self.place_at(furniture_key, label, at[:: max(1, len(at) // TRIES)])
+        if outcome.kind != "unreachable" or target.key not in self.scene.furniture:
+            return outcome
+        at = spots(self.scene, furniture_key, self._body.base, *CLOSER)  # beside what stands there
+        return self.place_at(furniture_key, label, at[:: max(1, len(at) // (2 * TRIES))])
 
     def _take_from_the_side(self) -> Outcome:
         """Put what the hand came down on back to where it was, and take it from the side: so it goes into a shelf."""

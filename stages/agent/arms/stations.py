@@ -72,13 +72,14 @@ def drivable(scene: SceneMap, base: Base, poses: list[Base]) -> list[tuple[float
     return sorted(((length, p) for length, p in lengths if length < float("inf")), key=lambda pair: pair[0])
 
 
-def spots(scene: SceneMap, place: str, base: Base, apart: float = 0.18) -> list[Position]:
-    """Return positions on furniture that are free as far as is known, the nearest to the base first."""
+def spots(scene: SceneMap, place: str, base: Base, apart: float = 0.18, inside: float = INSIDE) -> list[Position]:
+    """Return positions on furniture, `apart` [m] and `inside` [m] from its edges, that are free as far as is known, the
+    nearest to the base first."""
     piece = scene.furniture[place]
     if piece.levels and piece.open_to is not None:
         return _spots_in_shelf(scene, place, piece, piece.open_to, apart)
     steps = [
-        [c - s / 2 + INSIDE + k * apart for k in range(max(1, int((s - 2 * INSIDE) / apart) + 1))]
+        [c - s / 2 + inside + k * apart for k in range(max(1, int((s - 2 * inside) / apart) + 1))]
         for c, s in zip(piece.centre, piece.size, strict=True)
     ]
     occupied = [(i.position, i.radius) for i in scene.items.values() if i.place == place]

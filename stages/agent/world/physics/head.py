@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from scenewright.stages.agent.obstacle_map import CELL
@@ -29,8 +30,6 @@ By eye."""
 GRAIN = 0.04
 """Edge of the cubes in which furniture is kept [m]; by eye."""
 SHELVES = ("shelf",)
-TOP_CELL = 0.03
-"""Edge of a cell of a top [m]; by eye."""
 TOP_SHARE = 0.3
 """Share of the fullest level's cubes: the highest level that has as many is the top; above it are strays at the rims of
 things that stand there. By eye."""
@@ -75,8 +74,6 @@ class SeenPiece:
     cubes: set[tuple[int, ...]] = field(default_factory=set)
     measured_top: float | None = None
     """Height of its top as the wrist camera measured it [m]."""
-    bare: set[tuple[int, ...]] = field(default_factory=set)
-    """Cells (2,) of its top, `TOP_CELL` wide, that were seen."""
     _box: tuple[np.ndarray, np.ndarray] | None = None
 
     def add(self, points: np.ndarray) -> None:
@@ -88,17 +85,13 @@ class SeenPiece:
         """Take over what was seen of another one."""
         self._box = None
         self.cubes |= other.cubes
-        self.bare |= other.bare
         self.measured_top = other.measured_top if self.measured_top is None else self.measured_top
-
-    def keep_bare(self, points: np.ndarray) -> None:
-        """Enter points (N, 3) of its top."""
-        self.bare |= set(map(tuple, np.rint(points[:, :2] / TOP_CELL).astype(int).tolist()))
 
     def bare_at(self, x: float, y: float) -> bool:
         """Whether most of its top around a place [m] was seen."""
-        i, j = round(x / TOP_CELL), round(y / TOP_CELL)
-        return sum((i + a, j + b) in self.bare for a in (-1, 0, 1) for b in (-1, 0, 1)) > 4
+        i, j, k = (round(value / GRAIN) for value in (x, y, self.top))
+        around = product((-1, 0, 1), (-1, 0, 1))
+        return sum(any((i + a, j + b, k + c) in self.cubes for c in (-1, 0, 1)) for a, b in around) > 4
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:

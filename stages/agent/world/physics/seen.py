@@ -150,7 +150,6 @@ class Seen:
             counts, edges = np.histogram(heights, bins=np.arange(high[2] - 0.08, high[2] + 0.081, 0.005))
             top = edges[counts.argmax()] + 0.0025
             self.pieces[piece].measured_top = float(np.median(heights[np.abs(heights - top) < 0.006]))
-            self.pieces[piece].keep_bare(points[inside & (np.abs(points[:, 2] - top) < 0.012)])
 
     def piece_at(self, at: Position) -> int | None:
         """Return the number of the piece at a position, with a hand's breadth around it; None for the floor."""
