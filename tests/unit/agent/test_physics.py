@@ -19,11 +19,11 @@ from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.beliefs import Beliefs
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.eyes import Surface, fuse
-from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, Jaws, antipodal_grasps, within_reach
+from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, LEVEL, Jaws, antipodal_grasps, within_reach
 from scenewright.stages.agent.world.physics.hands import Target, grasps_of, whole_box
 from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
-from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
 from scenewright.stages.kit.motion.kinematics import forward
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.kit.simulation.robot_description import load_robot
@@ -250,8 +250,31 @@ def test_a_few_grasps_of_each_steepness_and_none_from_behind() -> None:
     normals = np.column_stack([np.tile(ring / 0.03, (12, 1)), np.zeros(720)])
     grasps = within_reach(antipodal_grasps(points, normals, JAWS, 0.0), 0.0)
     steep = [round(float(g[2, 2]), 1) for g in grasps]
-    assert steep == sorted(steep) and max(steep.count(p) for p in set(steep)) <= 8 and len(set(steep)) == 3
+    assert steep == sorted(steep) and max(steep.count(p) for p in set(steep)) <= 8 and len(set(steep)) == 5
     assert all(g[0, 2] > 0 for g in grasps if g[2, 2] > -0.99)
+    flat = [g for g in grasps if g[2, 2] > -np.sin(LEVEL)]
+    assert flat and all(g[0, 2] >= 0.8 * np.hypot(g[0, 2], g[1, 2]) - 1e-9 for g in flat), (
+        "it sees no middle from aside"
+    )
+
+
+def test_a_narrow_box_that_is_turned_is_taken_along_its_sides_and_noise_of_its_top_is_no_palm_in_the_way() -> None:
+    """64 by 144 mm, 7 degrees off any of the headings all around: there it is wider than the hand opens."""
+    random, yaw = np.random.default_rng(4), np.pi / 8 + 0.12
+    half = np.array([0.032, 0.072])
+    top = np.column_stack([random.uniform(-half, half, (3000, 2)), np.full(3000, 0.18)])
+    face = np.column_stack(
+        [random.uniform(-half[0], half[0], 1500), np.full(1500, -half[1]), random.uniform(0, 0.18, 1500)]
+    )
+    side = np.column_stack(
+        [np.full(3000, -half[0]), random.uniform(-half[1], half[1], 3000), random.uniform(0, 0.18, 3000)]
+    )
+    normals = np.repeat(np.array([(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (-1.0, 0.0, 0.0)]), (3000, 1500, 3000), axis=0)
+    turn = transform_from_yaw(yaw, np.zeros(3))
+    points = apply(turn, np.concatenate([top, face, side])) + random.normal(0, 0.001, (7500, 3))
+    grasps = antipodal_grasps(points, normals @ turn[:3, :3].T, JAWS, floor=0.0)
+    assert grasps and np.allclose(grasps[0][:3, 2], (0, 0, -1), atol=1e-6)
+    assert abs(grasps[0][:3, 1] @ turn[:3, 0]) > np.cos(0.03), "across the narrow side"
 
 
 def test_a_way_goes_around_what_is_known() -> None:

@@ -49,7 +49,7 @@ OF_ONE_PITCH = 8
 ASIDE = 0.3
 """Least cosine between where an aslant hand comes from and where the robot stands: it does not reach around a thing."""
 STRAIGHT = 0.8
-"""The same of a hand that goes into a shelf, which has walls."""
+"""The same of a hand that goes into a shelf, which has walls, and of a flat one: of one side alone it sees no middle."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,8 @@ def within_reach(grasps: list[np.ndarray], heading: float, least: float = ASIDE)
     for pose in grasps:
         along = pose[:2, 2]
         pitch, level = round(float(pose[2, 2]), 2), float(np.hypot(*along))
-        aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < least * level
+        most = max(least, STRAIGHT) if level > np.cos(LEVEL) else least
+        aside = level > 0.1 and float(along @ (np.cos(heading), np.sin(heading))) < most * level
         if not aside and of_pitch.get(pitch, 0) < OF_ONE_PITCH:
             of_pitch[pitch] = of_pitch.get(pitch, 0) + 1
             reachable.append(pose)
