@@ -49,7 +49,7 @@ OF_ONE_PITCH = 8
 ASIDE = 0.3
 """Least cosine between where an aslant hand comes from and where the robot stands: it does not reach around a thing."""
 STRAIGHT = 0.8
-"""The same of a hand that goes into a shelf, which has walls, and of a flat one: of one side alone it sees no middle."""
+"""The same of a hand that goes into a shelf, which has walls, and of a flat one, which sees no middle from aside."""
 
 
 @dataclass(frozen=True)
