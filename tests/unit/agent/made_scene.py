@@ -1,4 +1,4 @@
-"""A true scene made by hand: a table with a can, and a cabinet of two drawers with a cup in the upper one."""
+"""A true scene made by hand: a table with a can, a cabinet of two drawers with a cup in the upper one, or a shelf."""
 
 from __future__ import annotations
 
@@ -24,6 +24,13 @@ CARCASS: Boxes = (
     ((WIDTH, DEPTH, 0.04), (0, 0, 0.02)),
 )
 TABLE: Boxes = (((0.8, 1.2, 0.04), (0, 0, 0.72)), ((0.1, 0.1, 0.7), (0, 0, 0.35)))
+SHELF_AT, BOARDS = (0.3, -1.8, 0.0), (0.05, 0.41, 0.77, 1.13)
+"""Of a shelf that looks along y, and the height of its boards [m]."""
+SHELF: Boxes = (
+    ((0.8, WALL, 1.5), (0, -0.14, 0.75)),
+    *(((WALL, 0.3, 1.5), (side * 0.39, 0, 0.75)) for side in (-1, 1)),
+    *(((0.78, 0.3, WALL), (0, 0, height - WALL / 2)) for height in BOARDS),
+)
 
 
 def drawer(low: float) -> Boxes:
@@ -38,8 +45,8 @@ def drawer(low: float) -> Boxes:
     )
 
 
-def write_room(folder: Path, *, opened: float = 0.0) -> Path:
-    """Write the scene folder, the upper drawer `opened` [m]; return it."""
+def write_room(folder: Path, *, opened: float = 0.0, shelf: bool = False) -> Path:
+    """Write the scene folder, the upper drawer `opened` [m], with a `shelf` as well; return it."""
     links, joints, records = [], [], []
     slides = tuple(
         Joint(
@@ -60,6 +67,8 @@ def write_room(folder: Path, *, opened: float = 0.0) -> Path:
         "table_2": (TABLE, TABLE_AT, (0.8, 1.2, 0.74)),
         "cabinet_3": (CARCASS, CABINET_AT, (WIDTH, DEPTH, HEIGHT)),
     }
+    if shelf:
+        still["shelf_6"] = (SHELF, SHELF_AT, (0.8, 0.3, 1.5))
     for name, (boxes, at, size) in still.items():
         links.append(_link(name, boxes, mass=20.0))
         joints.append(_joint(f"world__{name}", "fixed", "world", name, at))

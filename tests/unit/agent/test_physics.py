@@ -259,9 +259,9 @@ def test_a_few_grasps_of_each_steepness_and_none_from_behind() -> None:
 
 
 def test_a_narrow_box_that_is_turned_is_taken_along_its_sides_and_noise_of_its_top_is_no_palm_in_the_way() -> None:
-    """64 by 144 mm, 7 degrees off any of the headings all around: there it is wider than the hand opens."""
-    random, yaw = np.random.default_rng(4), np.pi / 8 + 0.12
-    half = np.array([0.032, 0.072])
+    """63 by 144 mm, 11 degrees off any of the headings all around: along those it is wider than the hand opens."""
+    random, yaw = np.random.default_rng(4), np.pi / 16
+    half = np.array([0.0315, 0.072])
     top = np.column_stack([random.uniform(-half, half, (3000, 2)), np.full(3000, 0.18)])
     face = np.column_stack(
         [random.uniform(-half[0], half[0], 1500), np.full(1500, -half[1]), random.uniform(0, 0.18, 1500)]
@@ -271,10 +271,10 @@ def test_a_narrow_box_that_is_turned_is_taken_along_its_sides_and_noise_of_its_t
     )
     normals = np.repeat(np.array([(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (-1.0, 0.0, 0.0)]), (3000, 1500, 3000), axis=0)
     turn = transform_from_yaw(yaw, np.zeros(3))
-    points = apply(turn, np.concatenate([top, face, side])) + random.normal(0, 0.001, (7500, 3))
+    points = apply(turn, np.concatenate([top, face, side])) + random.normal(0, 0.0005, (7500, 3))
     grasps = antipodal_grasps(points, normals @ turn[:3, :3].T, JAWS, floor=0.0)
-    assert grasps and np.allclose(grasps[0][:3, 2], (0, 0, -1), atol=1e-6)
-    assert abs(grasps[0][:3, 1] @ turn[:3, 0]) > np.cos(0.03), "across the narrow side"
+    above = [pose for pose in grasps if np.allclose(pose[:3, 2], (0, 0, -1), atol=1e-6)]
+    assert len(above) > 1 and all(abs(pose[:3, 1] @ turn[:3, 0]) > np.cos(0.03) for pose in above)
 
 
 def test_a_way_goes_around_what_is_known() -> None:

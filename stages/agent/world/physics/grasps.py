@@ -121,17 +121,18 @@ def _grasp_at(
     closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
     axes = np.column_stack([np.cross(closing, approach), closing, approach])
     aside, along, depth = ((points - at) @ axes).T
-    way_in = (np.abs(aside) < FINGER_BAND) & (depth < jaws.tip_before)
-    between = way_in & (depth > -FINGER_BAND)
+    level, near, deepest = pitch < LEVEL, np.abs(aside) < FINGER_BAND, FINGER_DEPTH - BEFORE_PALM
+    front = float(np.percentile(depth[near], 3)) if level and near.any() else 0.0
+    way_in = near & (depth < jaws.tip_before + (front + deepest if level else 0.0))
+    between = way_in if level else way_in & (depth > -FINGER_BAND)  # a level hand may see but a front
     if between.sum() < LEAST:
         return None
     shift = np.percentile(along[way_in], [3, 97]).mean()
     along = along - shift
     first, last = np.percentile(along[between], [3, 97])
     deeper = 0.0
-    if pitch < LEVEL:
-        front = float(np.percentile(depth[way_in], 3))
-        deeper = max(0.0, front + min((last - first) / 2, FINGER_DEPTH - BEFORE_PALM))
+    if level:
+        deeper = max(0.0, front + min((last - first) / 2, deepest))
         depth = depth - deeper
     under_palm = (np.abs(along) < jaws.half_palm[0]) & (np.abs(aside) < jaws.half_palm[1])
     room = (jaws.opening - margin) / 2
