@@ -92,7 +92,7 @@ RUN = Stage(
     writes=AgentEpisode,
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="run_stage",
-    versions=".kit.acting.eyes.identity",
+    versions="segmenter_identity",
     data_files=lambda parameters: (
         (RECIPE, RATES_NAME, SHAPES, *robot_files(parameters.robot))
         if parameters.simulation == "physics"
@@ -109,7 +109,7 @@ REPLAY = Stage(
     writes=AgentEpisode,
     libraries=("numpy", "scipy", "numba", "matplotlib", "pybullet", "open3d", "trimesh"),
     module="replay_stage",
-    versions=".kit.acting.eyes.identity",
+    versions="segmenter_identity",
     data_files=lambda parameters: (RECIPE, RATES_NAME, SHAPES, *robot_files(parameters.robot)),
     example="scenewright agent replay --episode outputs/agent/episode --out outputs/agent/again",
 )

@@ -30,7 +30,7 @@ def library_versions(stage: Stage, parameters: Parameters) -> dict[str, str]:
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
     found |= {name: library_version(name) for name in stage.libraries}
     if stage.versions:
-        found.update(importlib.import_module(f".{stage.versions}", package_of(stage)).versions(parameters))
+        found.update(importlib.import_module(f"{package_of(stage)}.{stage.versions}").versions(parameters))
     return dict(sorted(found.items()))
 
 

@@ -141,9 +141,9 @@ class Stage:
     """Parameters -> files of `data/` that the step reads; their content is part of the key. The class vocabulary
     always is."""
     versions: str = ""
-    """Module of the step's folder, or after a dot of `stages`, whose `versions(parameters)` returns name -> version of
-    what decides the bytes under these parameters alone: the library of a backend, the model that a service runs. It
-    goes into the key and the manifest beside `libraries`; it may raise MissingDependency."""
+    """Module of the step's folder whose function `versions(parameters)` returns name -> version of what decides the
+    bytes under these parameters alone: the library of a backend, the model that a service runs. It goes into the key
+    and the manifest beside `libraries`; it may raise MissingDependency."""
     extras: tuple[Extra, ...] = ()
     """What some of its options need beyond what comes with the project; `doctor` lists them."""
     check: Callable[[Any, Mapping[str, Any]], None] | None = None

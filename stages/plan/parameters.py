@@ -124,7 +124,7 @@ STAGE = Stage(
     },
     writes=Plan,
     libraries=("numpy", "scipy", "numba", "ompl", "pybullet", "open3d", "trimesh"),
-    versions=".kit.acting.eyes.identity",
+    versions="segmenter_identity",
     data_files=plan_files,
     check=check_options,
     example="scenewright plan --scene outputs/demo/interactive_scene --ground-truth outputs/demo/ground_truth "

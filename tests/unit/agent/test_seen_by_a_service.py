@@ -16,11 +16,11 @@ from scenewright.stages.agent import replay_stage, run_stage
 from scenewright.stages.agent.goals import FURNITURE
 from scenewright.stages.agent.goals import THINGS as THINGS_KNOWN
 from scenewright.stages.agent.parameters import ReplayParameters, RunParameters, check_run
+from scenewright.stages.agent.segmenter_identity import versions
 from scenewright.stages.agent.world.physics import looking
 from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.kit.acting.eyes.asked import AskedSegmenter, word_of
-from scenewright.stages.kit.acting.eyes.identity import versions
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.rendering.object_views import Picture
 from scenewright.stages.kit.services.receiving import BoundedHandler, BoundedServer
