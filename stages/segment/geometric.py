@@ -15,7 +15,7 @@ from numba import prange
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.geometry.cameras import back_project
-from scenewright.stages.segment.normals import planes_of, surface_normals
+from scenewright.stages.segment.normals import normals_on_grid, planes_of
 
 REFERENCE_AREA = 640 * 480
 """Pixel counts among the parameters hold for images of this many pixels."""
@@ -300,7 +300,7 @@ def segment_depth(depth: np.ndarray, camera: Camera, settings: GeometricSettings
     if settings.smoothing_window:
         depth = smooth_depth(depth, window=settings.smoothing_window, deviation=settings.smoothing_deviation)
     points = back_project(depth, camera)
-    normals = surface_normals(
+    normals = normals_on_grid(
         points,
         window=settings.normal_window,
         step=settings.normal_step,
