@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -252,3 +253,22 @@ def robust_error(
     turned = None if normals is None else normals @ placement.rotation
     nearest = surface.closest(to_model(placement, points), placement.shape.joints, turned)
     return float(np.sqrt(np.mean(np.minimum(placement.scale * nearest.distance, truncation) ** 2)))
+
+
+def robust_errors(
+    surfaces: Mapping[str, ModelSurface], placements: Sequence[Placement], points: np.ndarray, truncation: float
+) -> list[float]:
+    """Return `robust_error` [m] of each of many placements without normals; each shape is asked once for all of its
+    placements."""
+    together: dict[tuple[object, ...], list[int]] = defaultdict(list)
+    for number, placement in enumerate(placements):
+        together[placement.shape.model.id, *sorted(placement.shape.joints.items())].append(number)
+    errors = [0.0] * len(placements)
+    for numbers in together.values():
+        shape = placements[numbers[0]].shape
+        local = np.concatenate([to_model(placements[number], points) for number in numbers])
+        distances = surfaces[shape.model.id].closest(local, shape.joints).distance.reshape(len(numbers), -1)
+        for number, distance in zip(numbers, distances, strict=True):
+            near = np.minimum(placements[number].scale * distance, truncation)
+            errors[number] = float(np.sqrt(np.mean(near**2)))
+    return errors
