@@ -191,53 +191,6 @@ def surface_normals(
     return _window_normals(*planes_of(points), window, step, distance_factor)
 
 
-def normals_on_grid(points: np.ndarray, *, window: int, step: int, distance_factor: float) -> np.ndarray:
-    """Return unit normals (H, W, 3) float32 as `surface_normals` does, computed for every step-th row and column alone.
-
-    The pixels between have the normal of the computed one around them that is nearest in depth, within
-    `distance_factor` x z; zero where none is. A quarter of the work with a step of 2.
-    """
-    if step == 1:
-        return surface_normals(points, window=window, step=1, distance_factor=distance_factor)
-    grid = np.ascontiguousarray(points[::step, ::step])
-    wide = 2 * (window // 2 // step) + 1
-    normals = surface_normals(grid, window=wide, step=1, distance_factor=distance_factor)
-    return _between(np.ascontiguousarray(points[..., 2]), grid[..., 2].copy(), normals, step, distance_factor)
-
-
-@compiled(error_model="numpy")
-def _between(
-    depth: np.ndarray, grid_depth: np.ndarray, grid_normals: np.ndarray, step: int, distance_factor: float
-) -> np.ndarray:
-    """Return the normals (H, W, 3) of all pixels from those of a grid (h, w, 3)."""
-    height, width = depth.shape
-    rows, columns = grid_depth.shape
-    normals = np.zeros((height, width, 3), dtype=np.float32)
-    for v in range(height):
-        above = v // step
-        below = min(above + (1 if v % step else 0), rows - 1)
-        for u in range(width):
-            z = depth[v, u]
-            if z <= 0.0:
-                continue
-            if v % step == 0 and u % step == 0:
-                for axis in range(3):
-                    normals[v, u, axis] = grid_normals[v // step, u // step, axis]
-                continue
-            left = u // step
-            right = min(left + (1 if u % step else 0), columns - 1)
-            nearest, row, column = np.float32(distance_factor) * z, -1, -1
-            for i in range(above, below + 1):
-                for j in range(left, right + 1):
-                    off = abs(grid_depth[i, j] - z)
-                    if grid_depth[i, j] > 0.0 and off < nearest:
-                        nearest, row, column = off, i, j
-            if row >= 0:
-                for axis in range(3):
-                    normals[v, u, axis] = grid_normals[row, column, axis]
-    return normals
-
-
 def planes_of(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the coordinates of vectors (H, W, 3) as images (H, W) float32 of their own."""
     x, y, z = np.ascontiguousarray(vectors.transpose(2, 0, 1), dtype=np.float32)
