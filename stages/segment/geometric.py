@@ -375,6 +375,15 @@ def nearest_of_grid(depth: np.ndarray, grid_depth: np.ndarray, step: int, ratio:
 
 
 def taken(values: np.ndarray, source: np.ndarray) -> np.ndarray:
-    """Return for each pixel what the grid (h, w, ...) has at its `source` (H, W), 0 for none."""
-    flat = np.concatenate([values.reshape(-1, *values.shape[2:]), np.zeros((1, *values.shape[2:]), values.dtype)])
-    return flat[source]
+    """Return for each pixel what the grid (h, w) or (h, w, 3) has at its `source` (H, W), 0 for none."""
+    return _taken(values.reshape(-1, *values.shape[2:]), source)
+
+
+@compiled
+def _taken(values: np.ndarray, source: np.ndarray) -> np.ndarray:
+    result = np.zeros(source.shape + values.shape[1:], dtype=values.dtype)
+    for v in range(source.shape[0]):
+        for u in range(source.shape[1]):
+            if source[v, u] >= 0:
+                result[v, u] = values[source[v, u]]
+    return result
