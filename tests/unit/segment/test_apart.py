@@ -48,7 +48,12 @@ def test_how_many(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"backend": "geometric", "fusion": "thesis"}, {"backend": "network"}, {"backend": "ground-truth", "corruption": 0.4}]
+    "options",
+    [
+        {"backend": "geometric", "fusion": "thesis"},
+        {"backend": "network"},
+        {"backend": "ground-truth", "corruption": 0.4},
+    ],
 )
 @pytest.mark.slow
 def test_same_bytes(options: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
