@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scenewright.stages.fuse.ground_index import GroundIndex, members_of
 from scipy import ndimage
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -99,6 +101,11 @@ class Footprint:
         self._depth = ndimage.distance_transform_edt(self.grid) - ndimage.distance_transform_edt(~self.grid)
         self.width = 2.0 * self.cell * float(self._depth.max())
         """Of the widest place [m]."""
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Two corners (2,) of the ground around it [m]."""
+        return self.corner * self.cell, (self.corner + self.grid.shape) * self.cell
 
     def holds(self, points: np.ndarray) -> np.ndarray:
         """Return which points (N, 2 or more) lie above, on or below it."""
@@ -237,8 +244,7 @@ def numbered_pieces(cloud: Cloud, parts: np.ndarray, cut: Collection[int], minim
     """Return the parts (V,) that are large enough to be pieces, as in `pieces_of`; those that are `cut` from
     others may be small."""
     pieces = []
-    for part in np.unique(parts[parts >= 0]):
-        own = np.flatnonzero(parts == part)
+    for part, own in members_of(parts, 0).items():
         extent, low = np.ptp(cloud.vertices[own], axis=0), cloud.vertices[own, 2].min()
         large = len(own) * cloud.voxel**2 >= minimum_area and extent[:2].max() >= SMALLEST
         if (large and extent[2] >= LEAST_HEIGHT and low < HIGHEST) or (len(own) >= cloud.fewest and part in cut):
@@ -342,11 +348,13 @@ def pieces_beside(
     standing |= _on_tops(cloud, cut, first)
     thing_of = np.where(cut < first, np.maximum(cut, 0), 0).astype(np.int32)
     loose = [p for p in np.unique(cut[cut >= first]).tolist() if p <= last and p not in standing | apart]
+    own_of, things = members_of(cut, first), _Things(cloud, thing_of)
     for part in loose:
-        own = np.flatnonzero(cut == part)
-        host = _host(cloud, own, thing_of)
+        own = own_of[part]
+        host = things.host(own)
         if host:
             thing_of[own], cut[own] = host, -1
+            things.add(host, own)
     cut = np.where(cut < first, -1, cut)
     joined = join_parts(cloud, cut, standing, cut_from, minimum_area)
     return Pieces(numbered_pieces(cloud, joined, standing | set(cut_from) | apart, minimum_area), thing_of)
@@ -366,32 +374,78 @@ def _touching(cloud: Cloud, own: np.ndarray, free: np.ndarray, parts: np.ndarray
 def _on_tops(cloud: Cloud, parts: np.ndarray, first: int) -> set[int]:
     """Return the parts from `first` on that begin on a level top of another and lie over it."""
     standing = set()
-    for top in _tops(cloud, parts):
-        over = (parts >= first) & (parts != top.part) & (cloud.vertices[:, 2] > top.level - RISE)
-        candidates = np.unique(parts[over & top.footprint.holds(cloud.vertices)])
+    tops = _tops(cloud, parts)
+    members = members_of(parts, first) if tops else {}
+    index = GroundIndex(cloud.vertices) if tops else None
+    for top in tops:
+        assert index is not None
+        around = index.around(*top.footprint.bounds)
+        over = (parts[around] >= first) & (parts[around] != top.part)
+        around = around[over & (cloud.vertices[around, 2] > top.level - RISE)]
+        candidates = np.unique(parts[around[top.footprint.holds(cloud.vertices[around])]])
         for part in candidates.tolist():
-            points = cloud.vertices[parts == part]
+            points = cloud.vertices[members[part]]
             if points[:, 2].min() > top.level - RISE and top.footprint.holds(points).mean() > 0.5:
                 standing.add(int(part))
     return standing
 
 
-def _host(cloud: Cloud, own: np.ndarray, thing_of: np.ndarray) -> int:
-    """Return the thing that a loose part (numbers) is a leg or a leaf of, 0 for none: it touches it, is smaller, begins
-    below its top and lies within its outline."""
-    points = cloud.vertices[own]
-    low, high = points.min(axis=0) - BESIDE, points.max(axis=0) + BESIDE
-    near = np.flatnonzero((thing_of > 0) & ((cloud.vertices >= low) & (cloud.vertices <= high))[:, :2].all(axis=1))
-    best, host = 0.0, 0
-    for name in np.unique(thing_of[near]).tolist():
-        thing = cloud.vertices[thing_of == name]
-        if len(thing) <= len(own) or points[:, 2].min() >= np.quantile(thing[:, 2], 0.75) - RISE:
-            continue
-        touching = cKDTree(thing).query(points, distance_upper_bound=2 * cloud.voxel)[0] < 2 * cloud.voxel
-        share = float((cKDTree(thing[:, :2]).query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE).mean())
-        if touching.any() and share >= WITHIN and share > best:
-            best, host = share, name
-    return host
+class _Things:
+    """Things of masks, each as it is while loose parts are given to them."""
+
+    def __init__(self, cloud: Cloud, thing_of: np.ndarray) -> None:
+        self._cloud = cloud
+        self._members = members_of(thing_of, 1)
+        self._shapes: dict[int, _Shape] = {}
+
+    def host(self, own: np.ndarray) -> int:
+        """Return the thing that a loose part (numbers) is a leg or a leaf of, 0 for none: it touches it, is smaller,
+        begins below its top and lies within its outline."""
+        points, voxel = self._cloud.vertices[own], self._cloud.voxel
+        low, high = points.min(axis=0) - BESIDE, points.max(axis=0) + BESIDE
+        best, host = 0.0, 0
+        for name in self._members:
+            thing = self._shape(name)
+            if (thing.high < low[:2]).any() or (thing.low > high[:2]).any():
+                continue
+            if len(thing.points) <= len(own) or points[:, 2].min() >= thing.top - RISE:
+                continue
+            touching = thing.tree.query(points, distance_upper_bound=2 * voxel)[0] < 2 * voxel
+            if not touching.any():
+                continue
+            share = float((thing.outline.query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE).mean())
+            if share >= WITHIN and share > best:
+                best, host = share, name
+        return host
+
+    def add(self, thing: int, own: np.ndarray) -> None:
+        """Let a part (numbers) be of a thing."""
+        self._members[thing] = np.concatenate([self._members[thing], own])
+        del self._shapes[thing]
+
+    def _shape(self, name: int) -> _Shape:
+        if name not in self._shapes:
+            self._shapes[name] = _Shape(self._cloud.vertices[self._members[name]])
+        return self._shapes[name]
+
+
+class _Shape:
+    """What is asked of the points (N, 3) of a thing."""
+
+    def __init__(self, points: np.ndarray) -> None:
+        self.points = points
+        self.low, self.high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        self.top = float(np.quantile(points[:, 2], 0.75))
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """In space."""
+        return cKDTree(self.points)
+
+    @cached_property
+    def outline(self) -> cKDTree:
+        """Seen from above."""
+        return cKDTree(self.points[:, :2])
 
 
 HELD = 0.3
@@ -409,14 +463,13 @@ def grown_things(
     piece = pieces_of(cloud, ~room, minimum_area)
     result = instance.copy()
     sizes = np.bincount(instance)
-    for number in range(1, int(piece.max(initial=0)) + 1):
-        own = piece == number
+    for own in members_of(piece, 1).values():
         inside = np.bincount(instance[own], minlength=len(sizes))
         unnamed, inside[0] = inside[0], 0
-        within = np.flatnonzero(inside >= 0.02 * own.sum())
+        within = np.flatnonzero(inside >= 0.02 * len(own))
         if len(within) != 1 or not unnamed:
             continue
         thing = int(within[0])
-        if thing not in sure and inside[thing] >= HELD * own.sum() and inside[thing] >= 0.6 * sizes[thing]:
-            result[own & (instance == 0)] = thing
+        if thing not in sure and inside[thing] >= HELD * len(own) and inside[thing] >= 0.6 * sizes[thing]:
+            result[own[instance[own] == 0]] = thing
     return result
