@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scenewright.stages.fuse.connecting import connected
 from scenewright.stages.fuse.ground_index import GroundIndex, members_of
 from scipy import ndimage
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 LEVEL = 0.9
@@ -134,15 +133,6 @@ class Footprint:
         return float(on_rim.mean()), float(length / whole)
 
 
-def connected(points: np.ndarray, voxel: float) -> np.ndarray:
-    """Return the connected part (N,) of points that are at most two voxels apart."""
-    if not len(points):
-        return np.zeros(0, int)
-    pairs = cKDTree(points).query_pairs(2.0 * voxel, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1])
-
-
 def cut_parts(cloud: Cloud, parts: np.ndarray) -> tuple[np.ndarray, set[int], dict[int, int]]:
     """Return the parts (V,) cut at level tops, which of the new ones stand on one, and {new part: the part that it was
     cut from}."""
@@ -157,7 +147,7 @@ def cut_parts(cloud: Cloud, parts: np.ndarray) -> tuple[np.ndarray, set[int], di
         rise = _over_top(points, cloud.vertices[top.members], cloud.voxel)
         # What is over the top by less is of it; what lies flat on it begins lower than what stands.
         rest = np.flatnonzero(np.where(inside, (rise > LEAST_RISE * cloud.voxel) | (over < -RISE), True))
-        for own in _groups(connected(points[rest], cloud.voxel), cloud.fewest):
+        for own in _groups(connected(points[rest], 2 * cloud.voxel), cloud.fewest):
             group = rest[own]
             rising, below = over[group] > RISE, over[group] < -RISE
             if not below.any():
@@ -233,7 +223,7 @@ def pieces_of(cloud: Cloud, free: np.ndarray, minimum_area: float) -> np.ndarray
     """
     parts = np.full(len(cloud.vertices), -1)
     members = np.flatnonzero(free)
-    parts[members] = connected(cloud.vertices[members], cloud.voxel)
+    parts[members] = connected(cloud.vertices[members], 2 * cloud.voxel)
     parts, standing, cut_from = cut_parts(cloud, parts)
     standing |= _on_tops(cloud, parts, 0)
     joined = join_parts(cloud, parts, standing, cut_from, minimum_area)
@@ -260,9 +250,9 @@ def _tops(cloud: Cloud, parts: np.ndarray) -> list[_Top]:
     """Return the level tops of all parts, the largest first."""
     level = np.flatnonzero((parts >= 0) & (cloud.normals[:, 2] > LEVEL) & (cloud.vertices[:, 2] > LOWEST_TOP))
     tops = []
-    # A step of more than a voxel parts two levels, and two parts are far apart.
-    apart = np.concatenate([cloud.vertices[level] * [1.0, 1.0, 2.0], 1000.0 * parts[level, None]], axis=1)
-    for own in _groups(connected(apart, cloud.voxel), round(LEAST_TOP_AREA / cloud.voxel**2)):
+    # A step of more than a voxel parts two levels.
+    levels = connected(cloud.vertices[level] * [1.0, 1.0, 2.0], 2 * cloud.voxel, parts[level])
+    for own in _groups(levels, round(LEAST_TOP_AREA / cloud.voxel**2)):
         members = level[own]
         middle = float(np.median(cloud.vertices[members, 2]))
         tops.append(_Top(int(parts[members[0]]), members, middle, Footprint(cloud.vertices[members, :2], cloud.voxel)))
@@ -332,7 +322,7 @@ def pieces_beside(
     free = np.flatnonzero((instance == 0) & ~room)
     first = int(instance.max(initial=0)) + 1
     parts = np.where(room, -1, np.where(instance > 0, instance, -1)).astype(np.int64)
-    parts[free] = first + connected(cloud.vertices[free], cloud.voxel)
+    parts[free] = first + connected(cloud.vertices[free], 2 * cloud.voxel)
     last = int(parts.max(initial=0))
     cut, standing, cut_from = cut_parts(cloud, parts)
     apart: set[int] = set()
