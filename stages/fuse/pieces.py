@@ -186,22 +186,28 @@ def join_parts(
     (`standing`) stays apart, and so does what was cut from each other.
     """
     result = parts.copy()
-    names, sizes = np.unique(parts[parts >= 0], return_counts=True)
-    names = np.array([name for name in names[sizes >= cloud.fewest] if name not in standing], int)
-    members = {name: np.flatnonzero(parts == name) for name in names}
+    large_enough = ((name, own) for name, own in members_of(parts, 0).items() if len(own) >= cloud.fewest)
+    members = {name: own for name, own in large_enough if name not in standing}
+    names = sorted(members)
     cells = {name: _cells(cloud.vertices[members[name]], cloud.voxel) for name in names}
     trees = {name: cKDTree(cloud.vertices[members[name]]) for name in names}
-    low = {name: cloud.vertices[members[name], 2].min() for name in names}
+    corners = {
+        name: (cloud.vertices[own].min(axis=0), cloud.vertices[own].max(axis=0)) for name, own in members.items()
+    }
+    low = {name: corners[name][0][2] for name in names}
     top = {
         name: _top_height(cloud.vertices[members[name]], cloud.normals[members[name]], cloud.voxel) for name in names
     }
-    for small in names.tolist():
+    for small in names:
         neighbours: list[tuple[float, int]] = []
-        for large in names.tolist():
+        for large in names:
             below, above = (small, large) if (low[small], small) < (low[large], large) else (large, small)
             if cut_from.get(small) == large or cut_from.get(large) == small:
                 continue
             if (len(members[large]), large) <= (len(members[small]), small) or low[above] > top[below] - RISE:
+                continue
+            apart = np.maximum(corners[large][0] - corners[small][1], corners[small][0] - corners[large][1])
+            if apart.max() > STACKED_GAP:
                 continue
             near = trees[large].query(cloud.vertices[members[small]], distance_upper_bound=STACKED_GAP)[0]
             gap = float(near.min())
