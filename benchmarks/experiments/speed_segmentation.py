@@ -119,7 +119,8 @@ def works() -> dict[tuple[str, str], Work]:
     points = [back_project(depth, CAMERA) for depth in smooth]
     window, step = settings.normal_window, settings.normal_step
     normals = [surface_normals(cloud, window=window, step=step) for cloud in points]
-    edges = [edge_map(d, p, n, settings) for d, p, n in zip(smooth, points, normals, strict=True)]
+    jumps = [depth_discontinuity(depth) for depth in smooth]
+    edges = [edge_map(d, p, n, j, settings) for d, p, n, j in zip(smooth, points, normals, jumps, strict=True)]
     segmented = [segment_depth(depth, CAMERA) for depth in depths]
     panoptic = [frame.masks for frame in frames]
     opencv = {

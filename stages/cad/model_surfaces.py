@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -71,11 +73,22 @@ class ModelSurface:
     """... and which of the part's triangles they are."""
     corners: dict[str, np.ndarray]
     """Part -> hull vertices (K, 3) of the visual mesh, part frame; they bound the part in every pose."""
-    pieces: dict[str, tuple[trimesh.Trimesh, ...]]
-    """Part -> convex collision pieces, part frame."""
+    read_pieces: Callable[[], Mapping[str, Sequence[trimesh.Trimesh]]]
+    """Returns `pieces`; most models are screened and never asked for them."""
     samples: dict[str, np.ndarray]
     """Part -> points (K, 3) spread over its visual mesh by area, part frame; `SAMPLES` over all parts."""
     looks: dict[str, Look]
+
+    @cached_property
+    def pieces(self) -> dict[str, tuple[trimesh.Trimesh, ...]]:
+        """Part -> convex collision pieces, part frame. Raises BadInput when meshes are missing."""
+        collision = self.read_pieces()
+        return {part: tuple(collision.get(part, [])) for part in self.model.parts}
+
+    @cached_property
+    def bounds(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Part -> least and largest coordinates (3,) of its visual mesh, part frame."""
+        return {part: (corners.min(axis=0), corners.max(axis=0)) for part, corners in self.corners.items()}
 
     def closest(self, points: np.ndarray, joints: dict[str, float], normals: np.ndarray | None = None) -> Nearest:
         """Return the nearest surface points of points (N, 3) in the model frame at scale 1.
@@ -92,10 +105,11 @@ class ModelSurface:
             model_from_part = transforms[part]
             local = apply(inverse(model_from_part), points).astype(np.float32)
             # Only points that may come closer than to the parts before.
-            outside = np.maximum(
-                np.maximum(self.corners[part].min(axis=0) - local, 0.0), local - self.corners[part].max(axis=0)
-            )
+            low, high = self.bounds[part]
+            outside = np.maximum(np.maximum(low - local, 0.0), local - high)
             in_reach = np.flatnonzero(np.linalg.norm(outside, axis=1) < distance)
+            if len(in_reach) == 0:
+                continue
             groups: list[tuple[int | None, np.ndarray]] = [(None, in_reach)]
             if normals is not None:
                 side = facing_side(normals[in_reach] @ model_from_part[:3, :3])
@@ -104,7 +118,7 @@ class ModelSurface:
                 all_sides = self.surfaces[part]
                 asked_of = all_sides if value is None else self.sides[part].get(value, all_sides)
                 answer = asked_of.scene.compute_closest_points(
-                    o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows]))
+                    o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows])), nthreads=1
                 )
                 foot = answer["points"].numpy().astype(float)
                 gap = np.linalg.norm(local[rows] - foot, axis=1)
@@ -164,13 +178,16 @@ def facing_side(normals: np.ndarray) -> np.ndarray:
 
 def load_surface(folder: Path, model: CadModel) -> ModelSurface:
     """Read a model folder of the library. Raises BadInput when meshes are missing."""
-    return surface_of(model, load_visual_parts(folder), load_collision_parts(folder))
+    return surface_of(model, load_visual_parts(folder), lambda: load_collision_parts(folder))
 
 
 def surface_of(
-    model: CadModel, visual: Mapping[str, trimesh.Trimesh], collision: Mapping[str, Sequence[trimesh.Trimesh]]
+    model: CadModel,
+    visual: Mapping[str, trimesh.Trimesh],
+    collision: Callable[[], Mapping[str, Sequence[trimesh.Trimesh]]],
 ) -> ModelSurface:
-    """Return the surface of a model with these meshes of its parts, part frames."""
+    """Return the surface of a model with these meshes of its parts, part frames; `collision` is called if its pieces
+    are asked for."""
     surfaces, corners = {}, {}
     sides: dict[str, dict[int, Triangles]] = {}
     numbers: dict[str, dict[int, np.ndarray]] = {}
@@ -186,14 +203,13 @@ def surface_of(
             if len(facing):
                 sides[part][side], numbers[part][side] = triangles_of(vertices, faces[facing]), facing
         corners[part] = np.asarray(visual[part].convex_hull.vertices)
-    pieces = {part: tuple(collision.get(part, [])) for part in model.parts}
     areas = {part: float(visual[part].area) for part in model.parts}
     samples = {}
     for k, part in enumerate(model.parts):
         count = max(1, round(SAMPLES * areas[part] / max(sum(areas.values()), 1e-12)))
         samples[part] = np.asarray(trimesh.sample.sample_surface(visual[part], count, seed=k)[0])
     looks = {part: look_of(visual[part]) for part in model.parts}
-    return ModelSurface(model, surfaces, sides, numbers, corners, pieces, samples, looks)
+    return ModelSurface(model, surfaces, sides, numbers, corners, collision, samples, looks)
 
 
 def look_of(mesh: trimesh.Trimesh) -> Look:
@@ -237,3 +253,22 @@ def robust_error(
     turned = None if normals is None else normals @ placement.rotation
     nearest = surface.closest(to_model(placement, points), placement.shape.joints, turned)
     return float(np.sqrt(np.mean(np.minimum(placement.scale * nearest.distance, truncation) ** 2)))
+
+
+def robust_errors(
+    surfaces: Mapping[str, ModelSurface], placements: Sequence[Placement], points: np.ndarray, truncation: float
+) -> list[float]:
+    """Return `robust_error` [m] of each of many placements without normals; each shape is asked once for all of its
+    placements."""
+    together: dict[tuple[object, ...], list[int]] = defaultdict(list)
+    for number, placement in enumerate(placements):
+        together[placement.shape.model.id, *sorted(placement.shape.joints.items())].append(number)
+    errors = [0.0] * len(placements)
+    for numbers in together.values():
+        shape = placements[numbers[0]].shape
+        local = np.concatenate([to_model(placements[number], points) for number in numbers])
+        distances = surfaces[shape.model.id].closest(local, shape.joints).distance.reshape(len(numbers), -1)
+        for number, distance in zip(numbers, distances, strict=True):
+            near = np.minimum(placements[number].scale * distance, truncation)
+            errors[number] = float(np.sqrt(np.mean(near**2)))
+    return errors

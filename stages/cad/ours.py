@@ -18,7 +18,7 @@ from scenewright.stages.cad.fitting import QUICK_ITERATIONS, fitted, refine, sha
 from scenewright.stages.cad.free_space import FreeSpace, load_free_space
 from scenewright.stages.cad.matching import Match, rank_matches
 from scenewright.stages.cad.method import Proposals, alignment_weights, matching_weights
-from scenewright.stages.cad.model_surfaces import ModelSurface, alignment_error, robust_error
+from scenewright.stages.cad.model_surfaces import ModelSurface, alignment_error, robust_error, robust_errors
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.placing import placement_of, size_misfit
 from scenewright.stages.cad.scoring import score_of, would_tip
@@ -176,17 +176,15 @@ class Ours:
     def _screening_scores(self, target: Target, matches: list[Match]) -> list[float]:
         parameters = self.parameters
         some = target.points[:: max(1, len(target.points) // SCREENING_POINTS)]
-        scores = []
-        for match in matches:
-            placement = placement_of(match, unaligned(match, self._scale_range))
-            error = robust_error(target.surfaces[match.shape.model.id], placement, some, None, TRUNCATION)
-            scores.append(
-                error
-                + parameters.misfit_weight * size_misfit(match.frame.size, placement)
-                + parameters.tilt_weight * match.tilt
-                + parameters.scale_weight * abs(math.log(placement.scale))
-            )
-        return scores
+        placements = [placement_of(match, unaligned(match, self._scale_range)) for match in matches]
+        errors = robust_errors(target.surfaces, placements, some, TRUNCATION)
+        return [
+            error
+            + parameters.misfit_weight * size_misfit(match.frame.size, placement)
+            + parameters.tilt_weight * match.tilt
+            + parameters.scale_weight * abs(math.log(placement.scale))
+            for match, placement, error in zip(matches, placements, errors, strict=True)
+        ]
 
     def _align(self, target: Target, matches: list[Match], rejected: Counter[str]) -> list[Aligned]:
         """Return the matches aligned by planes, the best by their error on vertices: planes alone rank badly where few

@@ -170,7 +170,7 @@ def stretched_plane(plane: SurfacePlane, factors: np.ndarray) -> SurfacePlane:
 def stretched_surface(model: CadModel, folder: Path) -> ModelSurface:
     """Return the surface of a stretched model; `folder`: of the model that it was. Raises BadInput."""
     visual, collision = _meshes(model, folder)
-    return surface_of(model, visual, collision)
+    return surface_of(model, visual, lambda: collision)
 
 
 def write_stretched(model: CadModel, source: Path, folder: Path) -> None:

@@ -43,7 +43,7 @@ def convex_of(vertices: np.ndarray) -> Convex:
     """Return the hull of vertices (V, 3) [m] as half-spaces; their bounding box where they are flat."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     try:
-        equations = ConvexHull(vertices).equations
+        equations = np.unique(ConvexHull(vertices).equations, axis=0)  # the triangles of a side have one and the same
         return Convex(equations[:, :3], -equations[:, 3], low, high)
     except QhullError:
         normals = np.concatenate([np.eye(3), -np.eye(3)])

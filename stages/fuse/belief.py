@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scenewright.stages.fuse.connecting import Cells, cells_of
+from scenewright.stages.fuse.voxel_blocks import find, pack
+from scenewright.stages.kit.compiled import compiled
 
 NEAR, FAR = 1.75, 3.0
 """Surface within this many voxels of a vertex is asked whether it goes on flush."""
@@ -31,20 +33,51 @@ def flush_shares(vertices: np.ndarray, normals: np.ndarray, instance: np.ndarray
 
     vertices, normals (V, 3), instance (V,); `voxel` [m], a vertex stands for one.
     """
-    tree = cKDTree(vertices)
-    pairs = tree.query_pairs(FAR * voxel, output_type="ndarray")
-    pairs = pairs[instance[pairs[:, 0]] != instance[pairs[:, 1]]]
-    offset = vertices[pairs[:, 1]] - vertices[pairs[:, 0]]
-    distance = np.linalg.norm(offset, axis=1)
-    first, second = normals[pairs[:, 0]], normals[pairs[:, 1]]
-    flush = (distance > NEAR * voxel) & (np.einsum("ij,ij->i", first, second) > FLUSH_COSINE)
-    for normal in (first, second):
-        flush &= np.abs(np.einsum("ij,ij->i", offset, normal)) < FLUSH_STEP * voxel
     on_rim = np.zeros(len(vertices), bool)
-    on_rim[pairs[flush].ravel()] = True
+    if len(vertices):
+        points, facing = np.ascontiguousarray(vertices, dtype=float), np.ascontiguousarray(normals, dtype=float)
+        _mark_rims(points, facing, np.ascontiguousarray(instance), cells_of(points, FAR * voxel), voxel, on_rim)
     size = np.bincount(instance)
     outline = RING * 2 * np.sqrt(np.pi * np.maximum(size, 1))
     return np.asarray(np.minimum(np.bincount(instance[on_rim], minlength=len(size)) / outline, 1.0))
+
+
+@compiled
+def _mark_rims(
+    points: np.ndarray, normals: np.ndarray, instance: np.ndarray, cells: Cells, voxel: float, on_rim: np.ndarray
+) -> None:
+    """Mark the points (N,) beside which the surface goes on flush in another instance."""
+    order, starts, coordinates, keys, slots = cells
+    for cell in range(len(coordinates)):
+        x, y, z = coordinates[cell]
+        for dx in range(-1, 2):
+            for dy in range(-1, 2):
+                for dz in range(-1, 2):
+                    other = find(keys, slots, pack(x + dx, y + dy, z + dz))
+                    if other < cell:  # none, or it was here before
+                        continue
+                    for a in range(starts[cell], starts[cell + 1]):
+                        for b in range(max(starts[other], a + 1), starts[other + 1]):
+                            i, j = order[a], order[b]
+                            if instance[i] == instance[j] or (on_rim[i] and on_rim[j]):
+                                continue
+                            if _is_flush(points[i], normals[i], points[j], normals[j], voxel):
+                                on_rim[i] = on_rim[j] = True
+
+
+@compiled
+def _is_flush(point: np.ndarray, normal: np.ndarray, other: np.ndarray, other_normal: np.ndarray, voxel: float) -> bool:
+    """Whether surface goes on flush between two points (3,), close by but not side by side."""
+    square, cosine, step, other_step = 0.0, 0.0, 0.0, 0.0
+    for axis in range(3):
+        offset = other[axis] - point[axis]
+        square += offset * offset
+        cosine += normal[axis] * other_normal[axis]
+        step += offset * normal[axis]
+        other_step += offset * other_normal[axis]
+    near, far, flat = NEAR * voxel, FAR * voxel, FLUSH_STEP * voxel
+    is_near = square <= far * far and np.sqrt(square) > near
+    return is_near and cosine > FLUSH_COSINE and abs(step) < flat and abs(other_step) < flat
 
 
 def usual_score(things: Sequence[int], told: Mapping[int, float], flush: np.ndarray) -> float:

@@ -40,7 +40,7 @@ class PanopticMapper:
         """Frames in which each instance was predicted, as the bits of an integer."""
         self.free_space = FreeSpace() if parameters.merging == "ours" else None
         is_ours = parameters.merging == "ours"
-        self.exposure = Exposure(np.zeros(3)) if is_ours and parameters.exposure else None
+        self.exposure = Exposure() if is_ours and parameters.exposure else None
         self.looks = Looks(parameters.voxel_size)
         self.cameras: list[np.ndarray] = []
         """Where the camera was at every frame (3,) [m]."""
@@ -73,9 +73,10 @@ class PanopticMapper:
         ids: np.ndarray | None = None,
         listing: Sequence[FrameSegment] = (),
         deviation: np.ndarray | None = None,
+        camera_name: str = "",
     ) -> None:
         """Fuse one frame: depth (H, W) float32 [m], colour (H, W, 3) uint8 or None, world_from_camera (4, 4), deviation
-        of depth (H, W) float32 [m] (0: unknown) or None.
+        of depth (H, W) float32 [m] (0: unknown) or None. Cameras of a log are told apart by `camera_name`.
 
         ids (H, W) int32: the frame's panoptic image, whose values `listing` explains; None fuses geometry alone. Raises
         BadInput for images of different sizes, for an id that is not listed, and for a camera too far from the origin
@@ -97,7 +98,7 @@ class PanopticMapper:
             )
         if self.exposure is not None and color is not None:
             color = self.exposure.corrected(
-                self.blocks, camera, depth, color, world_from_camera, self.truncation_distance
+                self.blocks, camera, camera_name, depth, color, world_from_camera, options.maximum_depth
             )
         index_image, frame_labels = None, np.zeros(1, dtype=np.int32)
         if ids is not None:

@@ -108,9 +108,9 @@ def spread_labels(
         return labels.copy()
     result = labels.copy()
     normals = vertex_normals(vertices, faces)
-    edges = np.concatenate([faces[:, pair] for pair in ([0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2])])
-    smooth = np.einsum("ij,ij->i", normals[edges[:, 0]], normals[edges[:, 1]]) >= minimum_cosine
-    edges = edges[smooth & (result[edges[:, 0]] == 0)]
+    both_ways = ([0, 1], [1, 0], [1, 2], [2, 1], [2, 0], [0, 2])
+    edges = np.concatenate([faces[result[faces[:, pair[0]]] == 0][:, pair] for pair in both_ways])
+    edges = edges[np.einsum("ij,ij->i", normals[edges[:, 0]], normals[edges[:, 1]]) >= minimum_cosine]
     for _ in range(steps):
         useful = edges[(result[edges[:, 0]] == 0) & (result[edges[:, 1]] > 0)]
         if not len(useful):

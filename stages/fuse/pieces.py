@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scenewright.stages.fuse.connecting import connected
+from scenewright.stages.fuse.ground_index import GroundIndex, members_of
 from scipy import ndimage
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 LEVEL = 0.9
@@ -100,6 +101,11 @@ class Footprint:
         self.width = 2.0 * self.cell * float(self._depth.max())
         """Of the widest place [m]."""
 
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Two corners (2,) of the ground around it [m]."""
+        return self.corner * self.cell, (self.corner + self.grid.shape) * self.cell
+
     def holds(self, points: np.ndarray) -> np.ndarray:
         """Return which points (N, 2 or more) lie above, on or below it."""
         cells = np.floor(points[:, :2] / self.cell).astype(int) - self.corner
@@ -127,15 +133,6 @@ class Footprint:
         return float(on_rim.mean()), float(length / whole)
 
 
-def connected(points: np.ndarray, voxel: float) -> np.ndarray:
-    """Return the connected part (N,) of points that are at most two voxels apart."""
-    if not len(points):
-        return np.zeros(0, int)
-    pairs = cKDTree(points).query_pairs(2.0 * voxel, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1])
-
-
 def cut_parts(cloud: Cloud, parts: np.ndarray) -> tuple[np.ndarray, set[int], dict[int, int]]:
     """Return the parts (V,) cut at level tops, which of the new ones stand on one, and {new part: the part that it was
     cut from}."""
@@ -150,7 +147,7 @@ def cut_parts(cloud: Cloud, parts: np.ndarray) -> tuple[np.ndarray, set[int], di
         rise = _over_top(points, cloud.vertices[top.members], cloud.voxel)
         # What is over the top by less is of it; what lies flat on it begins lower than what stands.
         rest = np.flatnonzero(np.where(inside, (rise > LEAST_RISE * cloud.voxel) | (over < -RISE), True))
-        for own in _groups(connected(points[rest], cloud.voxel), cloud.fewest):
+        for own in _groups(connected(points[rest], 2 * cloud.voxel), cloud.fewest):
             group = rest[own]
             rising, below = over[group] > RISE, over[group] < -RISE
             if not below.any():
@@ -189,22 +186,28 @@ def join_parts(
     (`standing`) stays apart, and so does what was cut from each other.
     """
     result = parts.copy()
-    names, sizes = np.unique(parts[parts >= 0], return_counts=True)
-    names = np.array([name for name in names[sizes >= cloud.fewest] if name not in standing], int)
-    members = {name: np.flatnonzero(parts == name) for name in names}
+    large_enough = ((name, own) for name, own in members_of(parts, 0).items() if len(own) >= cloud.fewest)
+    members = {name: own for name, own in large_enough if name not in standing}
+    names = sorted(members)
     cells = {name: _cells(cloud.vertices[members[name]], cloud.voxel) for name in names}
     trees = {name: cKDTree(cloud.vertices[members[name]]) for name in names}
-    low = {name: cloud.vertices[members[name], 2].min() for name in names}
+    corners = {
+        name: (cloud.vertices[own].min(axis=0), cloud.vertices[own].max(axis=0)) for name, own in members.items()
+    }
+    low = {name: corners[name][0][2] for name in names}
     top = {
         name: _top_height(cloud.vertices[members[name]], cloud.normals[members[name]], cloud.voxel) for name in names
     }
-    for small in names.tolist():
+    for small in names:
         neighbours: list[tuple[float, int]] = []
-        for large in names.tolist():
+        for large in names:
             below, above = (small, large) if (low[small], small) < (low[large], large) else (large, small)
             if cut_from.get(small) == large or cut_from.get(large) == small:
                 continue
             if (len(members[large]), large) <= (len(members[small]), small) or low[above] > top[below] - RISE:
+                continue
+            apart = np.maximum(corners[large][0] - corners[small][1], corners[small][0] - corners[large][1])
+            if apart.max() > STACKED_GAP:
                 continue
             near = trees[large].query(cloud.vertices[members[small]], distance_upper_bound=STACKED_GAP)[0]
             gap = float(near.min())
@@ -226,7 +229,7 @@ def pieces_of(cloud: Cloud, free: np.ndarray, minimum_area: float) -> np.ndarray
     """
     parts = np.full(len(cloud.vertices), -1)
     members = np.flatnonzero(free)
-    parts[members] = connected(cloud.vertices[members], cloud.voxel)
+    parts[members] = connected(cloud.vertices[members], 2 * cloud.voxel)
     parts, standing, cut_from = cut_parts(cloud, parts)
     standing |= _on_tops(cloud, parts, 0)
     joined = join_parts(cloud, parts, standing, cut_from, minimum_area)
@@ -237,8 +240,7 @@ def numbered_pieces(cloud: Cloud, parts: np.ndarray, cut: Collection[int], minim
     """Return the parts (V,) that are large enough to be pieces, as in `pieces_of`; those that are `cut` from
     others may be small."""
     pieces = []
-    for part in np.unique(parts[parts >= 0]):
-        own = np.flatnonzero(parts == part)
+    for part, own in members_of(parts, 0).items():
         extent, low = np.ptp(cloud.vertices[own], axis=0), cloud.vertices[own, 2].min()
         large = len(own) * cloud.voxel**2 >= minimum_area and extent[:2].max() >= SMALLEST
         if (large and extent[2] >= LEAST_HEIGHT and low < HIGHEST) or (len(own) >= cloud.fewest and part in cut):
@@ -254,9 +256,9 @@ def _tops(cloud: Cloud, parts: np.ndarray) -> list[_Top]:
     """Return the level tops of all parts, the largest first."""
     level = np.flatnonzero((parts >= 0) & (cloud.normals[:, 2] > LEVEL) & (cloud.vertices[:, 2] > LOWEST_TOP))
     tops = []
-    # A step of more than a voxel parts two levels, and two parts are far apart.
-    apart = np.concatenate([cloud.vertices[level] * [1.0, 1.0, 2.0], 1000.0 * parts[level, None]], axis=1)
-    for own in _groups(connected(apart, cloud.voxel), round(LEAST_TOP_AREA / cloud.voxel**2)):
+    # A step of more than a voxel parts two levels.
+    levels = connected(cloud.vertices[level] * [1.0, 1.0, 2.0], 2 * cloud.voxel, parts[level])
+    for own in _groups(levels, round(LEAST_TOP_AREA / cloud.voxel**2)):
         members = level[own]
         middle = float(np.median(cloud.vertices[members, 2]))
         tops.append(_Top(int(parts[members[0]]), members, middle, Footprint(cloud.vertices[members, :2], cloud.voxel)))
@@ -326,7 +328,7 @@ def pieces_beside(
     free = np.flatnonzero((instance == 0) & ~room)
     first = int(instance.max(initial=0)) + 1
     parts = np.where(room, -1, np.where(instance > 0, instance, -1)).astype(np.int64)
-    parts[free] = first + connected(cloud.vertices[free], cloud.voxel)
+    parts[free] = first + connected(cloud.vertices[free], 2 * cloud.voxel)
     last = int(parts.max(initial=0))
     cut, standing, cut_from = cut_parts(cloud, parts)
     apart: set[int] = set()
@@ -342,11 +344,13 @@ def pieces_beside(
     standing |= _on_tops(cloud, cut, first)
     thing_of = np.where(cut < first, np.maximum(cut, 0), 0).astype(np.int32)
     loose = [p for p in np.unique(cut[cut >= first]).tolist() if p <= last and p not in standing | apart]
+    own_of, things = members_of(cut, first), _Things(cloud, thing_of)
     for part in loose:
-        own = np.flatnonzero(cut == part)
-        host = _host(cloud, own, thing_of)
+        own = own_of[part]
+        host = things.host(own)
         if host:
             thing_of[own], cut[own] = host, -1
+            things.add(host, own)
     cut = np.where(cut < first, -1, cut)
     joined = join_parts(cloud, cut, standing, cut_from, minimum_area)
     return Pieces(numbered_pieces(cloud, joined, standing | set(cut_from) | apart, minimum_area), thing_of)
@@ -366,32 +370,78 @@ def _touching(cloud: Cloud, own: np.ndarray, free: np.ndarray, parts: np.ndarray
 def _on_tops(cloud: Cloud, parts: np.ndarray, first: int) -> set[int]:
     """Return the parts from `first` on that begin on a level top of another and lie over it."""
     standing = set()
-    for top in _tops(cloud, parts):
-        over = (parts >= first) & (parts != top.part) & (cloud.vertices[:, 2] > top.level - RISE)
-        candidates = np.unique(parts[over & top.footprint.holds(cloud.vertices)])
+    tops = _tops(cloud, parts)
+    members = members_of(parts, first) if tops else {}
+    index = GroundIndex(cloud.vertices) if tops else None
+    for top in tops:
+        assert index is not None
+        around = index.around(*top.footprint.bounds)
+        over = (parts[around] >= first) & (parts[around] != top.part)
+        around = around[over & (cloud.vertices[around, 2] > top.level - RISE)]
+        candidates = np.unique(parts[around[top.footprint.holds(cloud.vertices[around])]])
         for part in candidates.tolist():
-            points = cloud.vertices[parts == part]
+            points = cloud.vertices[members[part]]
             if points[:, 2].min() > top.level - RISE and top.footprint.holds(points).mean() > 0.5:
                 standing.add(int(part))
     return standing
 
 
-def _host(cloud: Cloud, own: np.ndarray, thing_of: np.ndarray) -> int:
-    """Return the thing that a loose part (numbers) is a leg or a leaf of, 0 for none: it touches it, is smaller, begins
-    below its top and lies within its outline."""
-    points = cloud.vertices[own]
-    low, high = points.min(axis=0) - BESIDE, points.max(axis=0) + BESIDE
-    near = np.flatnonzero((thing_of > 0) & ((cloud.vertices >= low) & (cloud.vertices <= high))[:, :2].all(axis=1))
-    best, host = 0.0, 0
-    for name in np.unique(thing_of[near]).tolist():
-        thing = cloud.vertices[thing_of == name]
-        if len(thing) <= len(own) or points[:, 2].min() >= np.quantile(thing[:, 2], 0.75) - RISE:
-            continue
-        touching = cKDTree(thing).query(points, distance_upper_bound=2 * cloud.voxel)[0] < 2 * cloud.voxel
-        share = float((cKDTree(thing[:, :2]).query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE).mean())
-        if touching.any() and share >= WITHIN and share > best:
-            best, host = share, name
-    return host
+class _Things:
+    """Things of masks, each as it is while loose parts are given to them."""
+
+    def __init__(self, cloud: Cloud, thing_of: np.ndarray) -> None:
+        self._cloud = cloud
+        self._members = members_of(thing_of, 1)
+        self._shapes: dict[int, _Shape] = {}
+
+    def host(self, own: np.ndarray) -> int:
+        """Return the thing that a loose part (numbers) is a leg or a leaf of, 0 for none: it touches it, is smaller,
+        begins below its top and lies within its outline."""
+        points, voxel = self._cloud.vertices[own], self._cloud.voxel
+        low, high = points.min(axis=0) - BESIDE, points.max(axis=0) + BESIDE
+        best, host = 0.0, 0
+        for name in self._members:
+            thing = self._shape(name)
+            if (thing.high < low[:2]).any() or (thing.low > high[:2]).any():
+                continue
+            if len(thing.points) <= len(own) or points[:, 2].min() >= thing.top - RISE:
+                continue
+            touching = thing.tree.query(points, distance_upper_bound=2 * voxel)[0] < 2 * voxel
+            if not touching.any():
+                continue
+            share = float((thing.outline.query(points[:, :2], distance_upper_bound=BESIDE)[0] < BESIDE).mean())
+            if share >= WITHIN and share > best:
+                best, host = share, name
+        return host
+
+    def add(self, thing: int, own: np.ndarray) -> None:
+        """Let a part (numbers) be of a thing."""
+        self._members[thing] = np.concatenate([self._members[thing], own])
+        del self._shapes[thing]
+
+    def _shape(self, name: int) -> _Shape:
+        if name not in self._shapes:
+            self._shapes[name] = _Shape(self._cloud.vertices[self._members[name]])
+        return self._shapes[name]
+
+
+class _Shape:
+    """What is asked of the points (N, 3) of a thing."""
+
+    def __init__(self, points: np.ndarray) -> None:
+        self.points = points
+        self.low, self.high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        self.top = float(np.quantile(points[:, 2], 0.75))
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """In space."""
+        return cKDTree(self.points)
+
+    @cached_property
+    def outline(self) -> cKDTree:
+        """Seen from above."""
+        return cKDTree(self.points[:, :2])
 
 
 HELD = 0.3
@@ -409,14 +459,13 @@ def grown_things(
     piece = pieces_of(cloud, ~room, minimum_area)
     result = instance.copy()
     sizes = np.bincount(instance)
-    for number in range(1, int(piece.max(initial=0)) + 1):
-        own = piece == number
+    for own in members_of(piece, 1).values():
         inside = np.bincount(instance[own], minlength=len(sizes))
         unnamed, inside[0] = inside[0], 0
-        within = np.flatnonzero(inside >= 0.02 * own.sum())
+        within = np.flatnonzero(inside >= 0.02 * len(own))
         if len(within) != 1 or not unnamed:
             continue
         thing = int(within[0])
-        if thing not in sure and inside[thing] >= HELD * own.sum() and inside[thing] >= 0.6 * sizes[thing]:
-            result[own & (instance == 0)] = thing
+        if thing not in sure and inside[thing] >= HELD * len(own) and inside[thing] >= 0.6 * sizes[thing]:
+            result[own[instance[own] == 0]] = thing
     return result

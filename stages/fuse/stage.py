@@ -163,5 +163,7 @@ def _integrate_frames(
                 listing = listed.get(frame.index)
                 camera = cameras[frame.camera_name]
                 depth = frame.depth if outdated is None else outdated.without(frame.depth, camera, pose, frame.index)
-                mapper.add_frame(camera, depth, frame.color, pose, ids, listing or (), frame.deviation)
+                mapper.add_frame(
+                    camera, depth, frame.color, pose, ids, listing or (), frame.deviation, frame.camera_name
+                )
     return mapper, skipped, label

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.ingest.source import LoadedFrame, Unusable
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.formats.foxglove import decode_color, millimetres_to_depth
 from scenewright.stages.kit.geometry.cameras import back_project
 
@@ -67,6 +68,21 @@ def filled_depth(depth: np.ndarray) -> np.ndarray:
         return np.ones(depth.shape, np.float32)
     hole = (~valid).astype(np.uint8)
     _, nearest = cv2.distanceTransformWithLabels(hole, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    values = np.zeros(int(nearest.max()) + 1, np.float32)
-    values[nearest[valid]] = depth[valid]
-    return values[nearest]
+    return _filled(depth, nearest, int(nearest.max()) + 1)
+
+
+@compiled(nogil=True)
+def _filled(depth: np.ndarray, nearest: np.ndarray, labels: int) -> np.ndarray:
+    """Return depth (H, W) with that of the valid pixel of the same label in `nearest` (H, W) where it is invalid."""
+    values = np.zeros(labels, np.float32)
+    height, width = depth.shape
+    for row in range(height):
+        for column in range(width):
+            if depth[row, column] > 0:
+                values[nearest[row, column]] = depth[row, column]
+    filled = depth.copy()
+    for row in range(height):
+        for column in range(width):
+            if not depth[row, column] > 0:
+                filled[row, column] = values[nearest[row, column]]
+    return filled

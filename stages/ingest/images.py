@@ -33,15 +33,16 @@ class DepthForm:
     """Of 16-bit images; float ones are what they are."""
 
 
-def usable_color(data: bytes, camera: Camera) -> np.ndarray | bytes:
-    """Return colour of the camera's size: JPEG and 8-bit PNG bytes as they are, anything else as (H, W, 3) uint8 RGB.
+def usable_color(data: bytes, camera: Camera, *, decoded: bool = False) -> np.ndarray | bytes:
+    """Return colour of the camera's size: JPEG and 8-bit PNG bytes as they are, anything else, and all where it is
+    wanted `decoded`, as (H, W, 3) uint8 RGB.
 
     A picture of another size and the same aspect ratio is resized. Raises Unusable.
     """
     image = decode_as_calibrated(data, (camera.width, camera.height))
     if image is None:
         raise Unusable("undecodable_color", f"{len(data)} bytes")
-    return data if is_kept(data, image, camera) else fitted_color(image, camera)
+    return data if not decoded and is_kept(data, image, camera) else fitted_color(image, camera)
 
 
 def is_kept(data: bytes, image: np.ndarray, camera: Camera) -> bool:

@@ -15,6 +15,7 @@ from scenewright.schemas.sequence import Gravity, Sequence, SequenceCamera, Sequ
 from scenewright.stages.ingest.detection import open_log
 from scenewright.stages.ingest.images import depth_roughness
 from scenewright.stages.ingest.key_frames import key_frames
+from scenewright.stages.ingest.loading import loaded
 from scenewright.stages.ingest.losses import ADVICE
 from scenewright.stages.ingest.origins import named_sources
 from scenewright.stages.ingest.own_poses import with_own_poses
@@ -141,13 +142,12 @@ def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestPar
 
     def cloud() -> tuple[np.ndarray, np.ndarray]:
         samples = [(np.zeros((0, 3)), np.zeros((0, 3)))]
-        for entry in context.progress.track(chosen, total=len(chosen), description="looking for the floor"):
-            try:
-                loaded = entry.load()
-            except Unusable:
-                continue  # counted when the frames are written
-            if loaded.depth is not None:
-                depth = millimetres_to_depth(loaded.depth)
+        for entry, images in context.progress.track(
+            loaded(chosen), total=len(chosen), description="looking for the floor"
+        ):
+            # What cannot be used is counted when the frames are written.
+            if isinstance(images, LoadedFrame) and images.depth is not None:
+                depth = millimetres_to_depth(images.depth)
                 samples.append(surface_samples(depth, cameras[entry.camera_name], entry.world_from_camera))
         return np.concatenate([points for points, _ in samples]), np.concatenate([normals for _, normals in samples])
 
@@ -186,12 +186,12 @@ def _write_frames(
         ) as writer,
         ThreadPoolExecutor(1, thread_name_prefix="write") as thread,
     ):
-        for entry in context.progress.track(entries, total=len(entries), description="frames"):
+        for entry, images in context.progress.track(loaded(entries), total=len(entries), description="frames"):
             if parameters.max_frames is not None and len(written.times) >= parameters.max_frames:
                 drops[NOT_SELECTED] += 1
                 continue
             try:
-                loaded = _within(entry.load(), parameters.maximum_depth)
+                frame = _usable(images, parameters.maximum_depth)
             except Unusable as problem:
                 drops[problem.reason] += 1
                 context.logger.warning("frame %s left out: %s", entry.name, problem)
@@ -209,16 +209,16 @@ def _write_frames(
             writing = thread.submit(
                 writer.write,
                 time,
-                loaded.color,
-                loaded.depth,
+                frame.color,
+                frame.depth,
                 pose,
-                loaded.labels,
-                right=loaded.right,
-                deviation=loaded.deviation,
-                picture=loaded.picture,
+                frame.labels,
+                right=frame.right,
+                deviation=frame.deviation,
+                picture=frame.picture,
                 camera_name=entry.camera_name,
             )
-            _note(written, time, entry, loaded, pose)
+            _note(written, time, entry, frame, pose)
         if writing is not None:
             writing.result()
     return written
@@ -253,7 +253,10 @@ def _note(written: _Written, time: float, entry: Entry, loaded: LoadedFrame, pos
         written.pose_cameras.append(entry.camera_name)
 
 
-def _within(loaded: LoadedFrame, maximum_depth: float | None) -> LoadedFrame:
+def _usable(loaded: LoadedFrame | Unusable, maximum_depth: float | None) -> LoadedFrame:
+    """Return the frame without depth beyond the most that is asked for [m]. Raises Unusable."""
+    if isinstance(loaded, Unusable):
+        raise loaded
     if maximum_depth is None or loaded.depth is None:
         return loaded
     depth = np.where(loaded.depth <= maximum_depth * 1000, loaded.depth, np.uint16(0))

@@ -62,4 +62,5 @@ def parameters_for(
         option = "--" + name.replace("_", "-")
         # A value that may be a password, given for the name of one, is not said back.
         got = "" if first["type"] == NOT_SHOWN else f"got {first.get('input')!r}"
-        raise UsageError(f"{stage.name}: {option}: {first['msg']}", hint=got) from None
+        wrong = [problem["msg"] for problem in error.errors() if problem["loc"][:1] == first["loc"][:1]]
+        raise UsageError(f"{stage.name}: {option}: {', or: '.join(wrong)}", hint=got) from None

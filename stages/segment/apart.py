@@ -64,6 +64,17 @@ def segmented_here(
         yield frame.index, fused.ids, describe(frame.index, fused)
 
 
+def unsegmented(reader: FrameReader) -> Iterator[Segmented]:
+    """Yield no segments for every frame of a log, in order: `fuse` makes nothing of segments that nobody named, it
+    finds things in the surface of the whole room."""
+    images = {
+        name: encode_panoptic_png(np.zeros((camera.height, camera.width), np.int32))
+        for name, camera in reader.cameras.items()
+    }
+    for frame in reader.frames(streams=()):
+        yield frame.index, images[frame.camera_name], FrameSegments(frame=frame.index, segments=())
+
+
 def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: int) -> Iterator[Segmented]:
     """Yield the segments of every frame of the log of a request, in order, from `workers` processes.
 

@@ -12,22 +12,45 @@ MOST_PAIRS = 200_000
 
 def clouds_touch(first: np.ndarray, second: np.ndarray, distance: float) -> bool:
     """Whether any point of `first` (N, 3) comes within `distance` [m] of any point of `second` (M, 3)."""
-    if not len(first) or not len(second):
-        return False
-    low = np.maximum(first.min(axis=0), second.min(axis=0)) - distance
-    high = np.minimum(first.max(axis=0), second.max(axis=0)) + distance
-    # Only points within reach of the other's bounds can be neighbours.
-    first = first[((first >= low) & (first <= high)).all(axis=1)]
-    second = second[((second >= low) & (second <= high)).all(axis=1)]
+    first, second = _in_reach(np.ascontiguousarray(first), np.ascontiguousarray(second), distance)
     if not len(first) or not len(second):
         return False
     beyond = np.nextafter(distance, np.inf)
     if len(first) * len(second) <= MOST_PAIRS:
-        return _any_within(first.astype(np.float64), second.astype(np.float64), beyond * beyond)
+        return _any_within(first, second, beyond * beyond)
     if len(first) < len(second):
         first, second = second, first
     nearest, _ = cKDTree(first).query(second, distance_upper_bound=beyond)
     return bool(np.isfinite(nearest).any())
+
+
+@compiled
+def _in_reach(first: np.ndarray, second: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return those points of (N, 3) and (M, 3), as float64, that are within `distance` of the other's bounds: only
+    they can be neighbours."""
+    reach = first.dtype.type(distance)
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    for cloud in (first, second):
+        for axis in range(3):
+            least, most = np.inf, -np.inf
+            for k in range(len(cloud)):
+                least, most = min(least, cloud[k, axis]), max(most, cloud[k, axis])
+            low[axis] = max(low[axis], least - reach)
+            high[axis] = min(high[axis], most + reach)
+    return _within(first, low, high), _within(second, low, high)
+
+
+@compiled
+def _within(cloud: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return the points of a cloud (N, 3) between two corners (3,), as float64."""
+    kept = np.empty((len(cloud), 3))
+    count = 0
+    for k in range(len(cloud)):
+        x, y, z = cloud[k]
+        if low[0] <= x <= high[0] and low[1] <= y <= high[1] and low[2] <= z <= high[2]:
+            kept[count, 0], kept[count, 1], kept[count, 2] = x, y, z
+            count += 1
+    return kept[:count]
 
 
 @compiled

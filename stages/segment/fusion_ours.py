@@ -40,15 +40,14 @@ def fuse(
     small: np.ndarray | None = None,
 ) -> FusedFrame:
     """Return the fused segments of a frame (`FusionRule`)."""
+    minimum_pixels = pixels_at(settings.minimum_pixels, geometric.shape)
+    if not panoptic.masks:
+        large = labels_over(geometric, np.bincount(geometric.ravel()) >= minimum_pixels)
+        return describe(large, np.zeros(int(geometric.max(initial=0)) + 1, dtype=np.int64), panoptic)
     panoptic = masks_with_depth(panoptic, points)
     least_claimed = pixels_at(settings.small_object_pixels, geometric.shape)
     fewest = pixels_at(settings.small_object_pixels // 2, geometric.shape)
-    labels = without_small(
-        geometric,
-        panoptic,
-        minimum_pixels=pixels_at(settings.minimum_pixels, geometric.shape),
-        keep_claimed=least_claimed,
-    )
+    labels = without_small(geometric, panoptic, minimum_pixels=minimum_pixels, keep_claimed=least_claimed)
     labels = claim_unlabelled(labels, panoptic.ids, points[..., 2], minimum_pixels=fewest)
     if small is not None:
         labels = claim_small(labels, small, panoptic, minimum_pixels=fewest)

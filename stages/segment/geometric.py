@@ -7,7 +7,8 @@ components of what is left. Constants: those Han's system was run with.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -25,6 +26,7 @@ REFERENCE_AREA = 640 * 480
 class GeometricSettings:
     """Constants of the convexity segmentation; see stages/segment/parameters.py for their meaning."""
 
+    columns: int = 320
     smoothing_window: int = 7
     smoothing_deviation: float = 0.009
     normal_window: int = 9
@@ -49,11 +51,18 @@ class GeometricFrame:
     """(H, W) int32, 0 = none, else 1..n."""
     points: np.ndarray
     """(H, W, 3) float32 [m], camera frame, of the smoothed depth; zero where depth is invalid."""
-    normals: np.ndarray
-    """(H, W, 3) float32 unit vectors that face the camera, zero where there is none."""
     small: np.ndarray
     """(H, W) int32 regions under the least size, 1..m, 0 elsewhere: `labels` gives them to what surrounds them, but a
     mask may know better (a chair's leg before the floor)."""
+    source: np.ndarray
+    """(H, W) int32 pixel of the grid that each pixel is like, -1 for none."""
+    grid_normals: np.ndarray
+    """(h, w, 3) float32 normals of the grid."""
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """(H, W, 3) float32 unit vectors that face the camera, zero where there is none."""
+        return taken(self.grid_normals, self.source)
 
 
 def smooth_depth(depth: np.ndarray, *, window: int = 7, deviation: float = 0.009) -> np.ndarray:
@@ -154,9 +163,12 @@ def depth_discontinuity(depth: np.ndarray, *, ratio: float = 0.01, window: int =
     return valid & (np.maximum(farthest - depth, depth - nearest) > ratio * depth)
 
 
-def edge_map(depth: np.ndarray, points: np.ndarray, normals: np.ndarray, settings: GeometricSettings) -> np.ndarray:
+def edge_map(
+    depth: np.ndarray, points: np.ndarray, normals: np.ndarray, jumps: np.ndarray, settings: GeometricSettings
+) -> np.ndarray:
     """Return (H, W) bool: pixels on a concave crease, on a depth jump, or without depth.
 
+    `jumps` (H, W) bool as `depth_discontinuity` has them.
     The convex map is opened and the jumps are closed by squares of 2k+1 pixels, as the original does.
     """
     convexity = minimum_convexity(
@@ -167,7 +179,6 @@ def edge_map(depth: np.ndarray, points: np.ndarray, normals: np.ndarray, setting
         mutual=settings.mutual_convexity,
     )
     convex: np.ndarray = (convexity > settings.convexity_threshold).astype(np.uint8)
-    jumps = depth_discontinuity(depth, ratio=settings.discontinuity_ratio, window=settings.discontinuity_window)
     jump_mask: np.ndarray = jumps.astype(np.uint8)
     if settings.opening:
         convex = cv2.morphologyEx(convex, cv2.MORPH_OPEN, np.ones((2 * settings.opening + 1,) * 2, np.uint8))
@@ -294,24 +305,85 @@ def pixels_at(count: int, shape: tuple[int, ...]) -> int:
 
 
 def segment_depth(depth: np.ndarray, camera: Camera, settings: GeometricSettings | None = None) -> GeometricFrame:
-    """Return the geometric segments of a z-depth image (H, W) [m], 0 invalid (Han 2024, section 2.3.1)."""
+    """Return the geometric segments of a z-depth image (H, W) [m], 0 invalid (Han 2024, section 2.3.1).
+
+    They are found on a grid of every so many-th pixel, about `columns` across: a map has voxels of centimetres, and
+    pixels of 640 x 480 are millimetres apart. The pixels between are like the one around them nearest in depth.
+    """
     settings = settings or GeometricSettings()
     depth = np.ascontiguousarray(depth, dtype=np.float32)
     if settings.smoothing_window:
         depth = smooth_depth(depth, window=settings.smoothing_window, deviation=settings.smoothing_deviation)
+    step = max(1, round(depth.shape[1] / settings.columns)) if settings.columns else 1
     points = back_project(depth, camera)
+    jumps = depth_discontinuity(depth, ratio=settings.discontinuity_ratio, window=settings.discontinuity_window)
+    grid = np.ascontiguousarray(points[::step, ::step])
+    grid_depth = np.ascontiguousarray(depth[::step, ::step])
+    settings = on_grid(settings, step)
     normals = surface_normals(
-        points,
-        window=settings.normal_window,
-        step=settings.normal_step,
-        distance_factor=settings.normal_distance_factor,
+        grid, window=settings.normal_window, step=settings.normal_step, distance_factor=settings.normal_distance_factor
     )
-    edges = edge_map(depth, points, normals, settings)
     labels, small = label_all_regions(
-        edges,
-        points,
+        edge_map(grid_depth, grid, normals, jumps[::step, ::step], settings),
+        grid,
         normals,
-        minimum_pixels=pixels_at(settings.minimum_pixels, depth.shape),
+        minimum_pixels=pixels_at(settings.minimum_pixels, grid_depth.shape),
         ratio=settings.discontinuity_ratio,
     )
-    return GeometricFrame(labels=labels, points=points, normals=normals, small=small)
+    source = nearest_of_grid(depth, grid_depth, step, settings.discontinuity_ratio)
+    return GeometricFrame(taken(labels, source), points, taken(small, source), source, normals)
+
+
+def on_grid(settings: GeometricSettings, step: int) -> GeometricSettings:
+    """Return the settings for every step-th pixel: windows reach as far, and depth may differ as much more."""
+
+    def window(pixels: int) -> int:
+        return 2 * max(1, pixels // 2 // step) + 1
+
+    return replace(
+        settings,
+        normal_window=window(settings.normal_window),
+        normal_step=max(1, settings.normal_step // step),
+        convexity_window=window(settings.convexity_window),
+        discontinuity_ratio=settings.discontinuity_ratio * step,
+    )
+
+
+@compiled(error_model="numpy")
+def nearest_of_grid(depth: np.ndarray, grid_depth: np.ndarray, step: int, ratio: float) -> np.ndarray:
+    """Return for each pixel (H, W) the number of the grid's pixel (h, w) around it that is nearest in depth, int32; -1
+    where none is within `ratio` x depth, and without depth."""
+    height, width = depth.shape
+    rows, columns = grid_depth.shape
+    source = np.full((height, width), -1, dtype=np.int32)
+    for v in range(height):
+        above = v // step
+        below = min(above + (1 if v % step else 0), rows - 1)
+        for u in range(width):
+            z = depth[v, u]
+            if z <= 0.0:
+                continue
+            left = u // step
+            right = min(left + (1 if u % step else 0), columns - 1)
+            least = np.float32(ratio) * z
+            for row in range(above, below + 1):
+                for column in range(left, right + 1):
+                    off = abs(grid_depth[row, column] - z)
+                    if grid_depth[row, column] > 0.0 and off < least:
+                        least, source[v, u] = off, row * columns + column
+    return source
+
+
+def taken(values: np.ndarray, source: np.ndarray) -> np.ndarray:
+    """Return for each pixel what the grid (h, w) or (h, w, 3) has at its `source` (H, W), 0 for none."""
+    return _taken(values.reshape(-1, *values.shape[2:]), source)
+
+
+@compiled
+def _taken(values: np.ndarray, source: np.ndarray) -> np.ndarray:
+    result = np.zeros(source.shape + values.shape[1:], dtype=values.dtype)
+    for v in range(source.shape[0]):
+        for u in range(source.shape[1]):
+            if source[v, u] >= 0:
+                result[v, u] = values[source[v, u]]
+    return result

@@ -35,6 +35,11 @@ class CommonParameters(Parameters):
         "segment that several masks share; `voxblox++` neither splits nor clusters (give `--majority-share 0.5`)",
     )
 
+    columns: int = Field(
+        320,
+        ge=0,
+        description="Geometric segments are found on every so many-th pixel, about so many columns; 0: on all pixels",
+    )
     smoothing_window: int = Field(
         7, ge=0, le=31, description="Window of the bilateral filter on inverse depth [pixels]; 0 = none, as published"
     )

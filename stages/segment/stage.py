@@ -13,7 +13,7 @@ from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.kit.formats.frames import FrameReader, require_depth
 from scenewright.stages.kit.formats.masks import write_panoptic_zip
 from scenewright.stages.kit.stage import Context
-from scenewright.stages.segment.apart import segmented_apart, segmented_here, worker_count
+from scenewright.stages.segment.apart import Segmented, segmented_apart, segmented_here, unsegmented, worker_count
 from scenewright.stages.segment.choice import BackendRequest, choose_backend, chosen_backends, fitting
 from scenewright.stages.segment.parameters import SegmentParameters
 
@@ -54,18 +54,20 @@ def run(
             request = fitting(unfitted_request)
             backend = choose_backend(request)
         annotations: list[FrameSegments] = []
-        streams = tuple(dict.fromkeys(("depth", *backend.streams)))
-        workers = worker_count(
-            len(reader), all(declared.apart for declared in chosen_backends(request)), context.device
-        )
+        declared = chosen_backends(request)
+        nameless = all(each.nameless for each in declared)
+
+        def segmented() -> Iterable[Segmented]:
+            if nameless and parameters.fusion == "ours":
+                return unsegmented(reader)
+            streams = tuple(dict.fromkeys(("depth", *backend.streams)))
+            workers = worker_count(len(reader), all(each.apart for each in declared), context.device)
+            if workers > 1:
+                return segmented_apart(request, streams, workers)
+            return segmented_here(request, backend, streams, context.random)
 
         def images() -> Iterator[tuple[int, np.ndarray | bytes]]:
-            segmented = (
-                segmented_apart(request, streams, workers)
-                if workers > 1
-                else segmented_here(request, backend, streams, context.random)
-            )
-            for index, image, record in context.progress.track(segmented, total=len(reader), description="segment"):
+            for index, image, record in context.progress.track(segmented(), total=len(reader), description="segment"):
                 annotations.append(record)
                 yield index, image
 
@@ -93,9 +95,7 @@ def run(
     }
     if recognised is not None:
         summary["recognised_share"] = round(recognised, 3)
-    nameless = all(declared.nameless for declared in chosen_backends(request))
-    found = total if nameless else named_count
-    return Segments(context.output, outcome="ok" if found else "empty", summary=summary)
+    return Segments(context.output, outcome="ok" if named_count or nameless else "empty", summary=summary)
 
 
 def recognised_share(frames: Iterable[FrameSegments], unnamed: int) -> float | None:

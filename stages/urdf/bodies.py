@@ -96,12 +96,14 @@ def _body(
         )
     mesh = _mesh(cad_scene, node)
     bounds = _box(node, mesh, cad_scene)
-    inferred = () if added is None else tuple(np.array(corners) for corners in added.pieces)
-    if mobile.furniture and node.mark is None and mesh is not None and not _steady(graph, node, mesh, inferred):
-        mobile, held = Mobility(False), "it would not stand" if added is None else added.because
     origin = np.eye(4) if node.node_type == "layout" else _bottom(bounds)
     if mesh is not None:
         mesh.apply_translation(-origin[:3, 3])
+    inferred = () if added is None else tuple(np.array(corners) - origin[:3, 3] for corners in added.pieces)
+    if mobile.furniture and node.mark is None and mesh is not None:
+        height = support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id)
+        if height is None or not _steady(mesh, inferred, height - float(origin[2, 3])):
+            mobile, held = Mobility(False), "it would not stand" if added is None else added.because
     return BundleBody(
         name=node.id,
         class_name=node.class_name,
@@ -112,7 +114,7 @@ def _body(
         furniture=mobile.furniture,
         box=bounds,
         mesh=mesh,
-        inferred=tuple(corners - origin[:3, 3] for corners in inferred),
+        inferred=inferred,
         slabs=plates,
         because=_because(added, held),
     )
@@ -124,10 +126,8 @@ def _because(added: Inferred | None, held: str) -> str:
     return "" if added is None or not added.pieces else f"inferred: {added.what}; {added.because}"
 
 
-def _steady(graph: ContactGraphFile, node: GraphNode, mesh: trimesh.Trimesh, inferred: Sequence[np.ndarray]) -> bool:
-    height = support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id)
-    if height is None:
-        return False
+def _steady(mesh: trimesh.Trimesh, inferred: Sequence[np.ndarray], height: float) -> bool:
+    """Whether a mesh stands at a height [m] with what is inferred of it, all in one frame, z up."""
     seen = furniture_pieces(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces), height)
     return stands_steadily([*seen, *inferred], height)
 

@@ -115,6 +115,11 @@ def test_options_that_are_almost_zero() -> None:
         parameters_for(all_stages()["graph"], {"stray_distance": 5e-324})
 
 
+def test_a_choice_of_number_or_word_names_both() -> None:
+    with pytest.raises(UsageError, match="--every: Input should be a valid integer.*, or: Input should be 'auto'"):
+        parameters_for(all_stages()["ingest"], {"every": "often"})
+
+
 def test_seeds_over_32_bits_are_usage_errors(tmp_path: Path) -> None:
     assert run(["pack", "--out", str(tmp_path / "a"), "--seed", str(2**31)]) == 2
     assert run(["pack", "--out", str(tmp_path / "a"), "--seed", str(2**64)]) == 2

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scenewright.stages.fuse.free_space import FreeSpace
+from scenewright.stages.fuse.ground_index import GroundIndex
 from scenewright.stages.fuse.layout.planes import BAND, CELL, Plane
 from scipy import ndimage
 
@@ -48,6 +50,22 @@ class Scene:
     free: FreeSpace | None
     """None of a scan."""
 
+    @cached_property
+    def usually_bounding(self) -> float:
+        """Log odds of a bound by what masks said of the whole surface."""
+        return _called_bound(self, np.arange(len(self.vertices)))
+
+    @cached_property
+    def _index(self) -> GroundIndex:
+        return GroundIndex(self.vertices)
+
+    def around(self, plane: Plane, reach: float) -> np.ndarray:
+        """Return the numbers of all vertices before or behind what there is of a plane and the cells beside it, up to
+        `reach` [m] away, and of some more; each once."""
+        points = self.vertices[plane.members]
+        margin = 2 * CELL + BAND + reach * np.abs(plane.normal)
+        return self._index.around(points.min(axis=0) - margin, points.max(axis=0) + margin)
+
 
 def share_behind(plane: Plane, scene: Scene) -> tuple[float, float, float]:
     """Return the shares of a plane's cells behind which free space was seen, and surface, and that are thin.
@@ -55,10 +73,13 @@ def share_behind(plane: Plane, scene: Scene) -> tuple[float, float, float]:
     Of what is thin and was seen from both sides only the inside is asked. Beside a doorway free space says nothing.
     """
     cells = np.unique(plane.cells(scene.vertices[plane.members]), axis=0)
-    distance = plane.distance(scene.vertices)
-    other_side = np.flatnonzero((distance < -0.03) & (distance > -THIN) & (scene.normals @ plane.normal < -0.7))
+    around = scene.around(plane, FAR_BEHIND)
+    vertices = scene.vertices[around]
+    distance = plane.distance(vertices)
+    is_other_side = (distance < -0.03) & (distance > -THIN) & (scene.normals[around] @ plane.normal < -0.7)
+    other_side = np.flatnonzero(is_other_side)
     thickness = np.full(len(cells), np.inf)
-    own, back = _keys(cells), _keys(plane.cells(scene.vertices[other_side]))
+    own, back = _keys(cells), _keys(plane.cells(vertices[other_side]))
     order = np.argsort(own)
     place = np.minimum(np.searchsorted(own[order], back), len(own) - 1)
     is_own = own[order][place] == back
@@ -70,7 +91,7 @@ def share_behind(plane: Plane, scene: Scene) -> tuple[float, float, float]:
     away = distance_to_doorway(plane, cells, scene)
     far = FAR_BEHIND if np.isinf(away).all() else BEHIND_DOOR
     beyond = np.flatnonzero((distance < -0.1) & (distance > -far))
-    hidden = np.isin(own, np.unique(_keys(plane.cells(scene.vertices[beyond])))) & ~np.isfinite(thickness)
+    hidden = np.isin(own, np.unique(_keys(plane.cells(vertices[beyond])))) & ~np.isfinite(thickness)
     asked = away > BEHIND[-1]
     thin = float(np.isfinite(thickness).mean())
     return float(free[asked].mean()) if asked.any() else 0.0, float(hidden.mean()), thin
@@ -83,9 +104,10 @@ def share_overtopped(plane: Plane, scene: Scene) -> float:
     columns, column_of = np.unique(cells[:, 0], return_inverse=True)
     top = np.full(len(columns), np.iinfo(np.int64).min)
     np.maximum.at(top, column_of, cells[:, 1])
-    distance = plane.distance(scene.vertices)
-    behind = np.flatnonzero((distance < -BAND) & (distance > -DEEP) & (scene.normals @ plane.normal > PARALLEL))
-    over = plane.cells(scene.vertices[behind])
+    around = scene.around(plane, DEEP)
+    distance = plane.distance(scene.vertices[around])
+    is_behind = (distance < -BAND) & (distance > -DEEP) & (scene.normals[around] @ plane.normal > PARALLEL)
+    over = plane.cells(scene.vertices[around[is_behind]])
     place = np.minimum(np.searchsorted(columns, over[:, 0]), len(columns) - 1)
     is_over = (columns[place] == over[:, 0]) & (over[:, 1] >= top[place] + OVER)
     return len(np.unique(place[is_over])) / len(columns)
@@ -152,8 +174,7 @@ def votes(plane: Plane, scene: Scene) -> float:
     Masks that call everything a wall say nothing of any plane.
     """
     own = _called_bound(scene, plane.members)
-    usual = _called_bound(scene, np.arange(len(scene.vertices)))
-    return float(np.clip(1.5 * (own - max(usual, 0.0)), -VOTES, VOTES))
+    return float(np.clip(1.5 * (own - max(scene.usually_bounding, 0.0)), -VOTES, VOTES))
 
 
 def _called_bound(scene: Scene, members: np.ndarray) -> float:

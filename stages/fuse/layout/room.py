@@ -121,14 +121,17 @@ def _owners(planes: Sequence[Judged], scene: Scene) -> np.ndarray:
     owner = np.zeros(len(scene.vertices), np.int32)
     bounds = [(number, each) for number, each in enumerate(planes, 1) if each.log_odds > 0]
     for number, each in sorted(bounds, key=lambda row: not row[1].plane.is_level):  # a floor goes up to the wall
-        distance = each.plane.distance(scene.vertices)
+        around = np.arange(len(owner)) if each.plane.is_level else scene.around(each.plane, WITHIN)
+        around = around[owner[around] == 0]
+        vertices = scene.vertices[around]
+        distance = each.plane.distance(vertices)
         behind = _depth_of(each, planes, scene)
         of_plane = (distance < BEFORE) & (distance > -behind)
         if each.plane.is_level:
-            of_plane |= (np.abs(distance) < FLAT) & (scene.normals @ each.plane.normal > 0.8)
+            of_plane |= (np.abs(distance) < FLAT) & (scene.normals[around] @ each.plane.normal > 0.8)
         else:
-            of_plane &= np.isin(each.plane.cells(scene.vertices)[:, 0], _columns(each.plane, scene))
-        owner[of_plane & (owner == 0)] = number
+            of_plane &= np.isin(each.plane.cells(vertices)[:, 0], _columns(each.plane, scene))
+        owner[around[of_plane]] = number
     return owner
 
 

@@ -126,10 +126,18 @@ def file_bytes(path: Path, stream: str) -> bytes:
 
 
 def image_loader(
-    color: Path | None, depth: Path | None, camera: Camera, form: DepthForm, *, has_color: bool = True
+    color: Path | None,
+    depth: Path | None,
+    camera: Camera,
+    form: DepthForm,
+    *,
+    has_color: bool = True,
+    decoded: bool = False,
 ) -> Callable[[], LoadedFrame]:
-    """Return a function that reads and checks both images of a frame; `has_color`: whether the log has colour at all,
-    without which a frame of it is unusable then."""
+    """Return a function that reads and checks both images of a frame, the colour `decoded` for who resamples it.
+
+    `has_color`: whether the log has colour at all, without which a frame of it is unusable then.
+    """
 
     def load() -> LoadedFrame:
         if color is None and has_color:
@@ -137,7 +145,7 @@ def image_loader(
         if depth is None:
             raise Unusable("missing_depth")
         return LoadedFrame(
-            color=None if color is None else usable_color(file_bytes(color, "color"), camera),
+            color=None if color is None else usable_color(file_bytes(color, "color"), camera, decoded=decoded),
             depth=usable_depth(file_bytes(depth, "depth"), camera, form),
         )
 

@@ -24,6 +24,8 @@ PNG_BEGINNING = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"
 LARGEST_FILE = 4 * LARGEST_IMAGE
 """Largest panoptic picture in the archive [bytes]; a bound."""
 FRAME_NAME = re.compile(r"(\d{6,9})\.png", re.ASCII)
+PNG_OPTIONS = (cv2.IMWRITE_PNG_COMPRESSION, 3, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP)
+"""One filter for all rows, a third of the time of trying five: rows of labels are mostly those above."""
 FIXED_TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Every zip entry bears the earliest date the format knows, so that the same images give the same bytes."""
 
@@ -37,12 +39,8 @@ def encode_panoptic_png(ids: np.ndarray) -> bytes:
         raise ValueError(f"an id image has shape (H, W), not {ids.shape}")
     if int(ids.min()) < 0 or int(ids.max()) > LARGEST_ID:
         raise ValueError(f"panoptic ids lie in 0..{LARGEST_ID}, not {ids.min()}..{ids.max()}")
-    ids = ids.astype(np.uint32)
-    blue_green_red = np.empty((*ids.shape, 3), dtype=np.uint8)
-    blue_green_red[..., 2] = ids & 255
-    blue_green_red[..., 1] = (ids >> 8) & 255
-    blue_green_red[..., 0] = (ids >> 16) & 255
-    done, data = cv2.imencode(".png", blue_green_red, [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    red_green_blue = np.ascontiguousarray(ids, dtype="<u4").view(np.uint8).reshape(*ids.shape, 4)[..., :3]
+    done, data = cv2.imencode(".png", red_green_blue[..., ::-1], PNG_OPTIONS)
     if not done:
         raise ValueError("the PNG encoder refused the image")
     return data.tobytes()

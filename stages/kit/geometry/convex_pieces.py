@@ -5,6 +5,8 @@ For scans, which are open and have no inside: what is compared are convex hulls 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
@@ -18,47 +20,67 @@ LEAST_TRIANGLES = 8
 """Fewest triangles on either side of a cut; by eye."""
 MOST_TRIANGLES = 20_000
 """Most triangles that cuts are judged by; larger meshes are thinned."""
+MESHES_KEPT = 64
+"""Meshes whose pieces are kept: a scene is written several times with the same ones."""
 
 
 def convex_pieces(vertices: np.ndarray, faces: np.ndarray, most: int = MOST_PIECES) -> list[np.ndarray]:
     """Return the corner points (N, 3) of each piece, at most `most`; all points of the mesh are in some piece.
 
-    `vertices` (V, 3) [m], `faces` (F, 3). Every how many-th triangle of a large mesh decides where to cut.
+    `vertices` (V, 3) [m], `faces` (F, 3). Every how many-th triangle of a large mesh decides where to cut. A mesh that
+    was asked before is not cut again.
     """
-    corners = np.asarray(vertices, dtype=float)[np.asarray(faces)]
-    pieces = [corners]
-    cuts = [_best_cut(corners)]
-    while len(pieces) < most:
+    vertices, faces = np.ascontiguousarray(vertices, dtype=float), np.ascontiguousarray(faces, dtype=np.int64)
+    groups = _groups(vertices.tobytes(), faces.tobytes(), most)
+    return [np.unique(vertices[faces[group]].reshape(-1, 3), axis=0) for group in groups]
+
+
+@lru_cache(maxsize=MESHES_KEPT)
+def _groups(vertex_bytes: bytes, face_bytes: bytes, most: int) -> list[np.ndarray]:
+    """Return the numbers of the triangles of each piece."""
+    vertices = np.frombuffer(vertex_bytes, dtype=float).reshape(-1, 3)
+    faces = np.frombuffer(face_bytes, dtype=np.int64).reshape(-1, 3)
+    groups = [np.arange(len(faces))]
+    cuts = [_best_cut(vertices, faces)]
+    while len(groups) < most:
         best = int(np.argmax([0.0 if cut is None else cut[0] for cut in cuts]))
         cut = cuts[best]
         if cut is None:
             break
-        halves = [pieces[best][cut[1]], pieces[best][~cut[1]]]
-        pieces[best : best + 1] = halves
-        cuts[best : best + 1] = [_best_cut(half) for half in halves]
-    return [np.unique(piece.reshape(-1, 3), axis=0) for piece in pieces]
+        halves = [groups[best][cut[1]], groups[best][~cut[1]]]
+        groups[best : best + 1] = halves
+        cuts[best : best + 1] = [_best_cut(vertices, faces[half]) for half in halves]
+    return groups
 
 
-def _best_cut(corners: np.ndarray) -> tuple[float, np.ndarray] | None:
-    """Return the volume [m^3] that the best cut of triangles (F, 3, 3) saves and the one side (F,); None without any
-    that is worth it."""
-    if len(corners) < 2 * LEAST_TRIANGLES:
+def _best_cut(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, np.ndarray] | None:
+    """Return the volume [m^3] that the best cut of triangles (F, 3) saves and the one side (F,); None without any that
+    is worth it."""
+    if len(faces) < 2 * LEAST_TRIANGLES:
         return None
-    sample = corners[:: max(1, len(corners) // MOST_TRIANGLES)]
-    volume = hull_volume(sample)
+    sample = faces[:: max(1, len(faces) // MOST_TRIANGLES)]
+    volume = hull_volume(corners_of(vertices, sample))
     best: tuple[float, np.ndarray] | None = None
-    for axis in _axes(sample):
-        along, along_few = corners.mean(axis=1) @ axis, sample.mean(axis=1) @ axis
+    middles, middles_of_few = vertices[faces].mean(axis=1), vertices[sample].mean(axis=1)
+    for axis in _axes(vertices[sample]):
+        along, along_few = middles @ axis, middles_of_few @ axis
         low, high = along_few.min(), along_few.max()
         for share in PLACES:
             limit = low + share * (high - low)
             side = along_few < limit
             if min(side.sum(), (~side).sum()) < LEAST_TRIANGLES:
                 continue
-            saved = volume - hull_volume(sample[side]) - hull_volume(sample[~side])
+            saved = volume - sum(hull_volume(corners_of(vertices, sample[half])) for half in (side, ~side))
             if saved > GAIN * volume and (best is None or saved > best[0]):
                 best = (saved, along < limit)
     return best
+
+
+def corners_of(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the vertices (N, 3) of triangles (F, 3), each once."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    return vertices[used]
 
 
 def _axes(corners: np.ndarray) -> np.ndarray:
@@ -69,9 +91,9 @@ def _axes(corners: np.ndarray) -> np.ndarray:
     return np.array([[0.0, 0.0, 1.0], [*turned[:, 0], 0.0], [*turned[:, 1], 0.0]])
 
 
-def hull_volume(corners: np.ndarray) -> float:
-    """Return the volume [m^3] of the convex hull of points (..., 3) [m]; 0 where they are flat."""
+def hull_volume(points: np.ndarray) -> float:
+    """Return the volume [m^3] of the convex hull of points (N, 3) [m]; 0 where they are flat."""
     try:
-        return float(ConvexHull(corners.reshape(-1, 3)).volume)
+        return float(ConvexHull(points).volume)
     except (QhullError, ValueError):
         return 0.0  # flat

@@ -190,12 +190,12 @@ class SceneRenderer:
         shading.add_light(light, highlight, hits, self._surfaces(), blocked, point, color, self.light_map is None)
 
     def _shadow_mask(self, hits: Hits, point: np.ndarray) -> np.ndarray:
+        blocked = np.zeros(len(hits.t), dtype=np.bool_)
         if not self.shadows:
-            return np.zeros(len(hits.t), dtype=np.bool_)
-        t = np.where(hits.primitive != shading.MISS, hits.t, 0.0)[:, None]
-        origin = hits.rays[:, :3] + t * hits.rays[:, 3:] + 2e-3 * hits.normals
-        rays = np.concatenate([origin, point - origin], axis=1).astype(np.float32)
-        return self.scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 1.0).numpy() != 0
+            return blocked
+        rays, asked = shading.shadow_rays(hits, point)
+        blocked[asked] = self.scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), 1e-4, 1.0).numpy() != 0
+        return blocked
 
     def _refine(self, light: np.ndarray, edges: np.ndarray, camera: Camera, world_from_camera: np.ndarray) -> None:
         """Average four rays in the pixels on edges (rotated grid), after the tone curve's knee is applied."""

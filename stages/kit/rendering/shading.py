@@ -179,6 +179,29 @@ def add_light(
             highlight[k, channel] += shine * min(1.0, 4.0 * cosine) * color[channel]
 
 
+@compiled
+def shadow_rays(hits: Hits, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rays (M, 6) float32 from hits to a lamp at `point` (3,), a little above the surface, and which hits (M,)
+    they are of: those that face it, as others get no light of it whatever stands between."""
+    rays, primitive, _, t_hit, normals, _ = hits
+    result = np.empty((len(primitive), 6), dtype=np.float32)
+    asked = np.empty(len(primitive), dtype=np.int64)
+    count = 0
+    for k in range(len(primitive)):
+        if primitive[k] == MISS:
+            continue
+        cosine = np.float64(0.0)
+        for axis in range(3):
+            place = rays[k, axis] + t_hit[k] * rays[k, RAY_DIRECTION + axis]
+            cosine += np.float64(point[axis] - place) * normals[k, axis]
+            result[count, axis] = place + np.float32(2e-3) * normals[k, axis]
+            result[count, RAY_DIRECTION + axis] = point[axis] - result[count, axis]
+        if cosine > -1e-5:
+            asked[count] = k
+            count += 1
+    return result[:count], asked[:count]
+
+
 @compiled(parallel=True)
 def tone_map(linear: np.ndarray, exposure: float, table: np.ndarray) -> np.ndarray:
     """Return (N, 3) uint8 sRGB of linear light (N, 3): exposure, a soft shoulder over 0.6 that reaches white at

@@ -48,7 +48,12 @@ def test_how_many(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"backend": "geometric"}, {"backend": "network"}, {"backend": "ground-truth", "corruption": 0.4}]
+    "options",
+    [
+        {"backend": "geometric", "fusion": "thesis"},
+        {"backend": "network"},
+        {"backend": "ground-truth", "corruption": 0.4},
+    ],
 )
 @pytest.mark.slow
 def test_same_bytes(options: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,7 +81,7 @@ def test_a_process_that_is_killed_is_one_line(tmp_path: Path, monkeypatch: pytes
     killer = threading.Thread(target=kill_one)
     killer.start()
     with pytest.raises(MachineFailure, match="was killed") as caught:
-        segmented(sequence, tmp_path / "out", backend="geometric")
+        segmented(sequence, tmp_path / "out", backend="geometric", fusion="thesis")
     killer.join()
     assert "\n" not in str(caught.value) and multiprocessing.active_children() == []
 

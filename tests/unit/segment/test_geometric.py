@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenewright.schemas.scene_parts import Camera
@@ -11,8 +13,10 @@ from scenewright.stages.segment.geometric import (
     depth_discontinuity,
     label_regions,
     minimum_convexity,
+    nearest_of_grid,
     relabel,
     segment_depth,
+    taken,
 )
 from scenewright.stages.segment.normals import surface_normals
 
@@ -104,6 +108,27 @@ def test_box_on_a_plane() -> None:
 def test_without_the_crease_everything_is_one_segment() -> None:
     labels = segment_depth(TABLE.astype(np.float32), CAMERA, SMALL).labels
     assert labels.max() == 1 and (labels == 1).mean() > 0.99
+
+
+def test_a_large_image_is_cut_where_every_second_pixel_tells() -> None:
+    """Twice as many pixels of the same scene, one grid: edges stay within a pixel of it."""
+    fine = Camera(width=640, height=480, fx=560.0, fy=560.0, cx=319.5, cy=239.5)
+    seen = rays(fine)
+    table = plane_depth(seen, (0.0, np.cos(0.9), np.sin(0.9)), 1.2)
+    depth, which = combine(table, box_depth(seen, (0.05, 0.35, 1.22), (0.3, 0.3, 0.3), 0.6))
+    found = segment_depth(depth, fine, replace(SMALL, columns=320))
+    assert found.labels.shape == depth.shape and found.grid_normals.shape == (240, 320, 3)
+    thing = best_overlap(found.labels, which == 2)
+    assert best_overlap(found.labels, which == 1)[0] != thing[0] and thing[1] > 0.9
+    assert np.array_equal(found.normals[::2, ::2], found.grid_normals * (found.source[::2, ::2, None] >= 0))
+
+
+def test_pixels_between_are_like_the_grid_pixel_nearest_in_depth() -> None:
+    depth = np.array([[1.0, 1.0, 2.0], [1.0, 1.9, 2.0], [0.0, 1.5, 2.0]], np.float32)
+    grid = depth[::2, ::2].copy()
+    assert nearest_of_grid(depth, grid, 2, 0.1).tolist() == [[0, 0, 1], [0, 1, 1], [-1, -1, 3]]
+    labels = np.array([[5, 6], [0, 7]], np.int32)
+    assert taken(labels, nearest_of_grid(depth, grid, 2, 0.1)).tolist() == [[5, 5, 6], [5, 6, 6], [0, 0, 7]]
 
 
 def test_two_touching_boxes_at_an_angle() -> None:

@@ -174,10 +174,10 @@ def test_the_reference_server_equals_the_local_backend(
     room: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(GeometricBackend, "__call__", a_mask_each)
-    local = segment(room, tmp_path / "local", "geometric")
+    local = segment(room, tmp_path / "local", "geometric", fusion="thesis")
     assert local.summary["named_share"] == 1
     with serving(reference_server()) as address:
-        remote = segment(room, tmp_path / "remote", address)
+        remote = segment(room, tmp_path / "remote", address, fusion="thesis")
     ours, theirs = payload(local), payload(remote)
     assert ours[1] == theirs[1]  # every pixel of every frame
     assert [entry.segments for entry in local.info.frames] == [entry.segments for entry in remote.info.frames]

@@ -129,11 +129,19 @@ def test_same_seed_same_bytes(room: Written, tmp_path: Path) -> None:
 
 
 def test_geometric_backend_names_nothing_and_that_is_right(room: Written, tmp_path: Path) -> None:
-    made = segment(room.sequence, tmp_path / "out", backend="geometric")
+    made = segment(room.sequence, tmp_path / "out", backend="geometric", fusion="thesis")
     assert made.outcome == "ok" and made.summary["named_share"] == 0
     assert made.info.backend == "geometric" and "class-agnostic" in made.info.label
     for entry in made.info.frames:
         assert {(s.class_id, s.instance) for s in entry.segments} == {(0, 0)} and len(entry.segments) > 3
+
+
+def test_no_frame_is_segmented_where_nothing_is_named(room: Written, tmp_path: Path) -> None:
+    """`fuse` cuts the surface of the whole room then, whatever a frame's segments were."""
+    made = segment(room.sequence, tmp_path / "out", backend="geometric")
+    assert made.outcome == "ok" and not any(entry.segments for entry in made.info.frames)
+    with PanopticReader(made.path("panoptic.zip")) as images:
+        assert not any(images.read(entry.frame).any() for entry in made.info.frames)
 
 
 def test_thesis_fusion_is_another_one(room: Written, tmp_path: Path) -> None:
@@ -177,7 +185,8 @@ def test_nothing_found_is_an_outcome(tmp_path: Path) -> None:
         frames_in_log=1,
         gravity=Gravity(method="none", world_from_log=as_transform(np.eye(4))),
     ).write(root / "sequence.json")
-    assert segment(Sequence(root), tmp_path / "out", backend="geometric").outcome == "empty"
+    assert segment(Sequence(root), tmp_path / "out", backend="geometric", fusion="thesis").outcome == "ok"
+    assert segment(Sequence(root), tmp_path / "named", backend="network").outcome == "empty"
 
 
 def test_detector_on_the_kitchen(tmp_path: Path) -> None:

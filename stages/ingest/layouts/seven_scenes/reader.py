@@ -62,7 +62,8 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
     for number in sorted(files):
         images = files[number]
         pose, problem = _pose(images.get("pose"))
-        load = image_loader(images.get("color"), images.get("depth"), camera, form, has_color=has_color)
+        color, depth = images.get("color"), images.get("depth")
+        load = image_loader(color, depth, camera, form, has_color=has_color, decoded=register)
         if register:
             load = registered_loader(load, camera, COLOR_CAMERA, COLOR_FROM_DEPTH)
         entries.append(
@@ -72,7 +73,7 @@ def open_source(root: Path, parameters: IngestParameters, rule: str) -> LogSourc
                 world_from_camera=pose,
                 load=load,
                 problem=problem,
-                files=FrameFiles(images.get("color"), images.get("depth")),
+                files=FrameFiles(color, depth),
             )
         )
     notes = (

@@ -30,10 +30,10 @@ class FrameGeometry:
     """[m], camera frame."""
     available: np.ndarray
     """bool: there is depth."""
-    world_points: np.ndarray | None
-    """[m], world frame; None without a pose."""
-    upwardness: np.ndarray | None
-    """World z of the normals."""
+    normals: np.ndarray
+    """Camera frame."""
+    world_from_camera: np.ndarray | None
+    """(4, 4), None without a pose."""
     segment_pixels: np.ndarray
     """(n + 1,) available pixels of every segment."""
 
@@ -42,13 +42,9 @@ def frame_geometry(
     labels: np.ndarray, points: np.ndarray, normals: np.ndarray, world_from_camera: np.ndarray | None
 ) -> FrameGeometry:
     """Prepare a frame; all arrays (H, W, ...), camera frame."""
-    world_points = upwardness = None
-    if world_from_camera is not None:
-        world_points = points @ world_from_camera[:3, :3].T + world_from_camera[:3, 3]
-        upwardness = normals @ world_from_camera[2, :3]
     available = points[..., 2] > 0
     pixels = np.bincount(labels[available], minlength=int(labels.max(initial=0)) + 1)
-    return FrameGeometry(labels, points, available, world_points, upwardness, pixels)
+    return FrameGeometry(labels, points, available, normals, world_from_camera, pixels)
 
 
 def box_mask(
@@ -79,7 +75,7 @@ def box_mask(
             foreground |= of_label
         elif inside[label] >= 0.03 * labels.size:
             foreground |= of_label & _over_support(int(label), (x0, y0, x1, y1), geometry)
-    if flat_topped and geometry.world_points is not None:
+    if flat_topped and geometry.world_from_camera is not None:
         foreground &= ~_not_of_table(foreground, window, geometry)
     if foreground.any():
         mask[window] = _main_cluster(foreground, geometry.points[window])
@@ -129,8 +125,9 @@ def _fit_trimmed_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
 
 def _not_of_table(foreground: np.ndarray, window: tuple[slice, slice], geometry: FrameGeometry) -> np.ndarray:
     """Return which foreground pixels lie over the table's top, or lower but outside of what the top covers."""
-    assert geometry.world_points is not None and geometry.upwardness is not None
-    world, up = geometry.world_points[window], geometry.upwardness[window]
+    assert geometry.world_from_camera is not None
+    turn, place = geometry.world_from_camera[:3, :3], geometry.world_from_camera[:3, 3]
+    world, up = geometry.points[window] @ turn.T + place, geometry.normals[window] @ turn[2]
     heights = world[..., 2]
     level = foreground & (up > 0.9)
     if not level.any() or level.sum() < 0.1 * foreground.sum():
@@ -181,7 +178,8 @@ def _main_cluster(foreground: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the foreground pixels (h, w) of the heaviest Euclidean cluster; the middle of the window counts twice."""
     rows, columns = np.nonzero(foreground)
     cloud = points[rows, columns].astype(float)
-    extent = float(np.linalg.norm(np.percentile(cloud, 90, axis=0) - np.percentile(cloud, 10, axis=0)))
+    low, high = np.percentile(cloud, [10, 90], axis=0)
+    extent = float(np.linalg.norm(high - low))
     distance = float(np.clip(0.15 * extent, 0.03, 0.12))
     cell_of, count = _grid_cells(cloud, distance / 2)
     counts = np.bincount(cell_of, minlength=count)
