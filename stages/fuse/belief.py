@@ -57,7 +57,7 @@ def _mark_rims(
                     if other < cell:  # none, or it was here before
                         continue
                     for a in range(starts[cell], starts[cell + 1]):
-                        for b in range(max(starts[other], a + 1), starts[other + 1]):
+                        for b in range(a + 1 if other == cell else starts[other], starts[other + 1]):
                             i, j = order[a], order[b]
                             if instance[i] == instance[j] or (on_rim[i] and on_rim[j]):
                                 continue

@@ -59,7 +59,7 @@ def _parts(points: np.ndarray, groups: np.ndarray, cells: Cells, limit: float) -
                     if other < cell:  # none, or it was here before
                         continue
                     for a in range(starts[cell], starts[cell + 1]):
-                        for b in range(max(starts[other], a + 1), starts[other + 1]):
+                        for b in range(a + 1 if other == cell else starts[other], starts[other + 1]):
                             _join(points, groups, above, order[a], order[b], limit)
     number = np.full(len(points), -1)
     result = np.empty(len(points), np.int64)

@@ -146,9 +146,10 @@ def _find_gravity(source: LogSource, entries: list[Entry], parameters: IngestPar
             loaded(chosen), total=len(chosen), description="looking for the floor"
         ):
             # What cannot be used is counted when the frames are written.
-            if isinstance(images, LoadedFrame) and images.depth is not None:
+            pose = entry.world_from_camera
+            if isinstance(images, LoadedFrame) and images.depth is not None and pose is not None:
                 depth = millimetres_to_depth(images.depth)
-                samples.append(surface_samples(depth, cameras[entry.camera_name], entry.world_from_camera))
+                samples.append(surface_samples(depth, cameras[entry.camera_name], pose))
         return np.concatenate([points for points, _ in samples]), np.concatenate([normals for _, normals in samples])
 
     untouched = parameters.pose_convention == "as-is"  # another reading of the poses is another world
