@@ -18,13 +18,13 @@ Result = Callable[[], LoadedFrame | Unusable]
 def loaded(entries: Iterable[Entry]) -> Iterator[tuple[Entry, LoadedFrame | Unusable]]:
     """Yield the entries in order, each with its images or with why it cannot be used.
 
-    A log in one file is read by this thread alone: its readers have one place in it. Frames whose images are files are
-    loaded up to `THREADS` ahead.
+    A log in one file, or with a video, is read by this thread alone: its readers have one place in it. Frames whose
+    colour and depth are files of their own are loaded up to `THREADS` ahead.
     """
     with ThreadPoolExecutor(THREADS, thread_name_prefix="load") as threads:
         waiting: deque[tuple[Entry, Result]] = deque()
         for entry in entries:
-            if entry.files.color is None and entry.files.depth is None:
+            if entry.files.color is None or entry.files.depth is None:
                 yield entry, _load(entry)
                 continue
             waiting.append((entry, threads.submit(_load, entry).result))

@@ -15,7 +15,9 @@ DEPTH = np.ones((2, 2), np.uint16)
 
 
 def entry_of(number: int, *, files: bool, load) -> Entry:
-    paths = FrameFiles(depth=Path(f"{number}.png")) if files else FrameFiles()
+    paths = (
+        FrameFiles(Path(f"{number}.jpg"), Path(f"{number}.png")) if files else FrameFiles(depth=Path(f"{number}.png"))
+    )
     return Entry(str(number), float(number), None, load, files=paths)
 
 
