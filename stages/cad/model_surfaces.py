@@ -118,7 +118,7 @@ class ModelSurface:
                 all_sides = self.surfaces[part]
                 asked_of = all_sides if value is None else self.sides[part].get(value, all_sides)
                 answer = asked_of.scene.compute_closest_points(
-                    o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows])), nthreads=1
+                    o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows]))
                 )
                 foot = answer["points"].numpy().astype(float)
                 gap = np.linalg.norm(local[rows] - foot, axis=1)

@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scenewright.stages.fuse.connecting import Cells, cells_of
-from scenewright.stages.fuse.voxel_blocks import find, pack
+from scenewright.stages.fuse.connecting import Cells, cells_of, neighbours_of
 from scenewright.stages.kit.compiled import compiled
 
 NEAR, FAR = 1.75, 3.0
@@ -47,22 +46,16 @@ def _mark_rims(
     points: np.ndarray, normals: np.ndarray, instance: np.ndarray, cells: Cells, voxel: float, on_rim: np.ndarray
 ) -> None:
     """Mark the points (N,) beside which the surface goes on flush in another instance."""
-    order, starts, coordinates, keys, slots = cells
-    for cell in range(len(coordinates)):
-        x, y, z = coordinates[cell]
-        for dx in range(-1, 2):
-            for dy in range(-1, 2):
-                for dz in range(-1, 2):
-                    other = find(keys, slots, pack(x + dx, y + dy, z + dz))
-                    if other < cell:  # none, or it was here before
+    order, starts = cells.order, cells.starts
+    for cell in range(len(cells.coordinates)):
+        for other in neighbours_of(cells, cell):
+            for a in range(starts[cell], starts[cell + 1]):
+                for b in range(a + 1 if other == cell else starts[other], starts[other + 1]):
+                    i, j = order[a], order[b]
+                    if instance[i] == instance[j] or (on_rim[i] and on_rim[j]):
                         continue
-                    for a in range(starts[cell], starts[cell + 1]):
-                        for b in range(a + 1 if other == cell else starts[other], starts[other + 1]):
-                            i, j = order[a], order[b]
-                            if instance[i] == instance[j] or (on_rim[i] and on_rim[j]):
-                                continue
-                            if _is_flush(points[i], normals[i], points[j], normals[j], voxel):
-                                on_rim[i] = on_rim[j] = True
+                    if _is_flush(points[i], normals[i], points[j], normals[j], voxel):
+                        on_rim[i] = on_rim[j] = True
 
 
 @compiled

@@ -47,20 +47,27 @@ def cells_of(points: np.ndarray, edge: float) -> Cells:
 
 
 @compiled
+def neighbours_of(cells: Cells, cell: int) -> np.ndarray:
+    """Return the numbers (M,) of a cell and of the later ones that touch it: so each pair of cells comes once."""
+    x, y, z = cells.coordinates[cell]
+    found, count = np.empty(27, dtype=np.int64), 0
+    for k in range(27):
+        other = find(cells.keys, cells.slots, pack(x + k % 3 - 1, y + k // 3 % 3 - 1, z + k // 9 - 1))
+        if other >= cell:
+            found[count] = other
+            count += 1
+    return found[:count]
+
+
+@compiled
 def _parts(points: np.ndarray, groups: np.ndarray, cells: Cells, limit: float) -> np.ndarray:
-    order, starts, coordinates, keys, slots = cells
+    order, starts = cells.order, cells.starts
     above = np.arange(len(points))
-    for cell in range(len(coordinates)):
-        x, y, z = coordinates[cell]
-        for dx in range(-1, 2):
-            for dy in range(-1, 2):
-                for dz in range(-1, 2):
-                    other = find(keys, slots, pack(x + dx, y + dy, z + dz))
-                    if other < cell:  # none, or it was here before
-                        continue
-                    for a in range(starts[cell], starts[cell + 1]):
-                        for b in range(a + 1 if other == cell else starts[other], starts[other + 1]):
-                            _join(points, groups, above, order[a], order[b], limit)
+    for cell in range(len(cells.coordinates)):
+        for other in neighbours_of(cells, cell):
+            for a in range(starts[cell], starts[cell + 1]):
+                for b in range(a + 1 if other == cell else starts[other], starts[other + 1]):
+                    _join(points, groups, above, order[a], order[b], limit)
     number = np.full(len(points), -1)
     result = np.empty(len(points), np.int64)
     count = 0

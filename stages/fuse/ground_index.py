@@ -29,13 +29,3 @@ class GroundIndex:
         starts, ends = np.searchsorted(self._keys, rows + y0), np.searchsorted(self._keys, rows + y1 + 1)
         found = [self._order[start:end] for start, end in zip(starts, ends, strict=True)]
         return np.concatenate(found) if found else np.zeros(0, np.int64)
-
-
-def members_of(labels: np.ndarray, first: int) -> dict[int, np.ndarray]:
-    """Return {label: numbers of its members, ascending} of labels (N,) from `first` on, ascending."""
-    if not len(labels):
-        return {}
-    order = np.argsort(labels, kind="stable")
-    names, starts = np.unique(labels[order], return_index=True)
-    groups = np.split(order, starts[1:])
-    return {int(name): own for name, own in zip(names, groups, strict=True) if name >= first}

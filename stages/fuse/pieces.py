@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from scenewright.stages.fuse.connecting import connected
-from scenewright.stages.fuse.ground_index import GroundIndex, members_of
+from scenewright.stages.fuse.ground_index import GroundIndex
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -265,13 +265,19 @@ def _tops(cloud: Cloud, parts: np.ndarray) -> list[_Top]:
     return sorted(tops, key=lambda top: (-len(top.members), top.members[0]))
 
 
+def members_of(labels: np.ndarray, first: int) -> dict[int, np.ndarray]:
+    """Return {label: numbers of its members, ascending} of labels (N,) from `first` on, ascending."""
+    if not len(labels):
+        return {}
+    order = np.argsort(labels, kind="stable")
+    names, starts = np.unique(labels[order], return_index=True)
+    groups = np.split(order, starts[1:])
+    return {int(name): own for name, own in zip(names, groups, strict=True) if name >= first}
+
+
 def _groups(labels: np.ndarray, fewest: int) -> list[np.ndarray]:
     """Return the numbers of the members of each label (N,) that has enough, in the order of the labels."""
-    if not len(labels):
-        return []
-    order = np.argsort(labels, kind="stable")
-    starts = np.flatnonzero(np.diff(labels[order], prepend=-2))
-    return [own for own in np.split(order, starts[1:]) if len(own) >= fewest]
+    return [own for own in members_of(labels, 0).values() if len(own) >= fewest]
 
 
 def _over_top(points: np.ndarray, top: np.ndarray, voxel: float) -> np.ndarray:

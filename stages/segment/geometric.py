@@ -335,7 +335,8 @@ def segment_depth(depth: np.ndarray, camera: Camera, settings: GeometricSettings
 
 
 def on_grid(settings: GeometricSettings, step: int) -> GeometricSettings:
-    """Return the settings for every step-th pixel: windows reach as far, and depth may differ as much more."""
+    """Return the settings for every step-th pixel: windows reach as far, and depth may differ as much
+    more. Opening and closing stay counts of the grid's pixels."""
 
     def window(pixels: int) -> int:
         return 2 * max(1, pixels // 2 // step) + 1

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from scenewright.stages.fuse.ground_index import CELL, GroundIndex, members_of
+from scenewright.stages.fuse.ground_index import CELL, GroundIndex
+from scenewright.stages.fuse.pieces import members_of
 
 
 @given(st.integers(0, 2**31))
