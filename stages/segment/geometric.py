@@ -26,7 +26,7 @@ REFERENCE_AREA = 640 * 480
 class GeometricSettings:
     """Constants of the convexity segmentation; see stages/segment/parameters.py for their meaning."""
 
-    columns: int = 320
+    grid_columns: int = 320
     smoothing_window: int = 7
     smoothing_deviation: float = 0.009
     normal_window: int = 9
@@ -307,14 +307,14 @@ def pixels_at(count: int, shape: tuple[int, ...]) -> int:
 def segment_depth(depth: np.ndarray, camera: Camera, settings: GeometricSettings | None = None) -> GeometricFrame:
     """Return the geometric segments of a z-depth image (H, W) [m], 0 invalid (Han 2024, section 2.3.1).
 
-    They are found on a grid of every so many-th pixel, about `columns` across: a map has voxels of centimetres, and
-    pixels of 640 x 480 are millimetres apart. The pixels between are like the one around them nearest in depth.
+    They are found on a grid of every so many-th pixel, about `grid_columns` across: a map has voxels of centimetres,
+    and pixels of 640 x 480 are millimetres apart. The pixels between are like the one around them nearest in depth.
     """
     settings = settings or GeometricSettings()
     depth = np.ascontiguousarray(depth, dtype=np.float32)
     if settings.smoothing_window:
         depth = smooth_depth(depth, window=settings.smoothing_window, deviation=settings.smoothing_deviation)
-    step = max(1, round(depth.shape[1] / settings.columns)) if settings.columns else 1
+    step = max(1, round(depth.shape[1] / settings.grid_columns)) if settings.grid_columns else 1
     points = back_project(depth, camera)
     jumps = depth_discontinuity(depth, ratio=settings.discontinuity_ratio, window=settings.discontinuity_window)
     grid = np.ascontiguousarray(points[::step, ::step])

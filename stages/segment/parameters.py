@@ -35,7 +35,7 @@ class CommonParameters(Parameters):
         "segment that several masks share; `voxblox++` neither splits nor clusters (give `--majority-share 0.5`)",
     )
 
-    columns: int = Field(
+    grid_columns: int = Field(
         320,
         ge=0,
         description="Geometric segments are found on every so many-th pixel, about so many columns; 0: on all pixels",

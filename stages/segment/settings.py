@@ -10,7 +10,7 @@ from scenewright.stages.segment.parameters import SegmentParameters
 def geometric_settings(parameters: SegmentParameters) -> GeometricSettings:
     """Return the constants of the geometric segmentation."""
     return GeometricSettings(
-        columns=parameters.columns,
+        grid_columns=parameters.grid_columns,
         smoothing_window=parameters.smoothing_window,
         smoothing_deviation=parameters.smoothing_deviation,
         normal_window=parameters.normal_window,

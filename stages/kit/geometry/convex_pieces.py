@@ -5,7 +5,7 @@ For scans, which are open and have no inside: what is compared are convex hulls 
 
 from __future__ import annotations
 
-from functools import lru_cache
+from hashlib import sha256
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -22,6 +22,8 @@ MOST_TRIANGLES = 20_000
 """Most triangles that cuts are judged by; larger meshes are thinned."""
 MESHES_KEPT = 64
 """Meshes whose pieces are kept: a scene is written several times with the same ones."""
+_kept: dict[tuple[bytes, int], list[np.ndarray]] = {}
+"""Digest of a mesh and most pieces -> numbers of the triangles of each piece; the last asked for last."""
 
 
 def convex_pieces(vertices: np.ndarray, faces: np.ndarray, most: int = MOST_PIECES) -> list[np.ndarray]:
@@ -31,15 +33,16 @@ def convex_pieces(vertices: np.ndarray, faces: np.ndarray, most: int = MOST_PIEC
     was asked before is not cut again.
     """
     vertices, faces = np.ascontiguousarray(vertices, dtype=float), np.ascontiguousarray(faces, dtype=np.int64)
-    groups = _groups(vertices.tobytes(), faces.tobytes(), most)
+    asked = sha256(vertices.tobytes() + faces.tobytes()).digest(), most
+    groups = _kept.pop(asked, None)
+    _kept[asked] = groups = _groups(vertices, faces, most) if groups is None else groups
+    if len(_kept) > MESHES_KEPT:
+        del _kept[next(iter(_kept))]
     return [np.unique(vertices[faces[group]].reshape(-1, 3), axis=0) for group in groups]
 
 
-@lru_cache(maxsize=MESHES_KEPT)
-def _groups(vertex_bytes: bytes, face_bytes: bytes, most: int) -> list[np.ndarray]:
+def _groups(vertices: np.ndarray, faces: np.ndarray, most: int) -> list[np.ndarray]:
     """Return the numbers of the triangles of each piece."""
-    vertices = np.frombuffer(vertex_bytes, dtype=float).reshape(-1, 3)
-    faces = np.frombuffer(face_bytes, dtype=np.int64).reshape(-1, 3)
     groups = [np.arange(len(faces))]
     cuts = [_best_cut(vertices, faces)]
     while len(groups) < most:

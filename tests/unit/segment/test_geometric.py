@@ -116,7 +116,7 @@ def test_a_large_image_is_cut_where_every_second_pixel_tells() -> None:
     seen = rays(fine)
     table = plane_depth(seen, (0.0, np.cos(0.9), np.sin(0.9)), 1.2)
     depth, which = combine(table, box_depth(seen, (0.05, 0.35, 1.22), (0.3, 0.3, 0.3), 0.6))
-    found = segment_depth(depth, fine, replace(SMALL, columns=320))
+    found = segment_depth(depth, fine, replace(SMALL, grid_columns=320))
     assert found.labels.shape == depth.shape and found.grid_normals.shape == (240, 320, 3)
     thing = best_overlap(found.labels, which == 2)
     assert best_overlap(found.labels, which == 1)[0] != thing[0] and thing[1] > 0.9
