@@ -46,7 +46,8 @@ def frame_views(
     """Return pictures of chosen frames and the legend of their segment colours."""
     views: list[FrameView] = []
     seen_classes: set[int] = set()
-    by_frame = {entry.frame: entry.segments for entry in segments.info.frames} if segments is not None else {}
+    listed = segments.info.frames if segments is not None else ()
+    by_frame = {entry.frame: entry.segments for entry in listed if entry.segments}
     with FrameReader(sequence.path("frames.mcap")) as reader:
         for index in choose_frames(len(reader), wanted):
             frame = reader.read(index)

@@ -19,6 +19,7 @@ from scenewright.schemas.errors import BadInput, UsageError
 from scenewright.schemas.evaluation import Evaluation, MetricsFile, Report
 from scenewright.schemas.interactive_scene import InteractiveScene
 from scenewright.schemas.manifest import InputRecord, Manifest, Provenance
+from scenewright.schemas.segments import Segments
 from scenewright.stages.kit.explaining.sources import sentences, sources_of
 from scenewright.stages.kit.progress import SilentProgress
 from scenewright.stages.kit.stage import Context
@@ -314,6 +315,19 @@ def test_parts_that_are_missing_have_no_section(tmp_path):
     ids = {a.get("id") for tag, a in parse((made.root / "report.html").read_text()).seen if tag == "section"}
     assert ids == {"frames", "cost", "made"}
     assert "came without manifests" in (made.root / "report.html").read_text()
+
+
+def test_frames_without_segments_have_no_picture_of_them(tmp_path):
+    sequence, segments = make_sequence(tmp_path / "sequence"), make_segments(tmp_path / "segments")
+    with_segments = report(tmp_path / "with", sequence=sequence, segments=segments)
+    file = segments.root / "segments.json"
+    told = json.loads(file.read_text())
+    told["frames"] = [entry | {"segments": []} for entry in told["frames"]]
+    file.write_text(json.dumps(told))
+    without = report(tmp_path / "without", sequence=sequence, segments=Segments(segments.root))
+    assert 0 < without.summary["pictures"] < with_segments.summary["pictures"]
+    text = parse((without.root / "report.html").read_text()).text
+    assert "blue far)." in text and "blue far), segments." not in text
 
 
 def test_an_empty_map_and_graph_are_reported(tmp_path):

@@ -22,5 +22,6 @@ def view(page: Page) -> dict[str, Any] | None:
     text += f" ({dropped} left out). " if dropped else ". "
     gravity = info.gravity.method.replace("_", " ")
     text += f"Read as {info.source_format}; which way is up: {gravity}. "
-    text += "Each card: colour, depth (yellow near, blue far)" + (", segments." if segments is not None else ".")
+    has_segments = any(each.segments for each in views)
+    text += "Each card: colour, depth (yellow near, blue far)" + (", segments." if has_segments else ".")
     return {"frames": views, "legend": legend, "frames_text": text} if views else None
