@@ -35,7 +35,8 @@ from benchmarks.timing import Clock
 
 VIEWS = 6
 OURS, NETWORK, BY_NETWORK = "ours", "our network", "a frame by our network"
-PARTS = ("whole", "smoothing", "normals", "convexity", "labels", "fusion", NETWORK, BY_NETWORK)
+ON_GRID = "whole, on its grid"
+PARTS = ("whole", ON_GRID, "smoothing", "normals", "convexity", "labels", "fusion", NETWORK, BY_NETWORK)
 PEERS = (
     ("numpy", "whole"),
     ("numpy", "normals"),
@@ -113,7 +114,7 @@ def open3d_normals(depth: np.ndarray) -> np.ndarray:
 def works() -> dict[tuple[str, str], Work]:
     """Return what is timed of every method and part."""
     frames = make_frames(VIEWS)
-    settings = GeometricSettings()
+    settings = GeometricSettings(grid_columns=0)
     depths = [frame.depth for frame in frames]
     smooth = [smooth_depth(depth) for depth in depths]
     points = [back_project(depth, CAMERA) for depth in smooth]
@@ -165,7 +166,8 @@ def works() -> dict[tuple[str, str], Work]:
         return label_regions(pick(edges, k), pick(points, k), pick(normals, k), minimum_pixels=200, ratio=0.01)
 
     return {
-        (OURS, "whole"): lambda k: segment_depth(pick(depths, k), CAMERA),
+        (OURS, "whole"): lambda k: segment_depth(pick(depths, k), CAMERA, settings),  # as the others: every pixel
+        (OURS, ON_GRID): lambda k: segment_depth(pick(depths, k), CAMERA),
         (OURS, "smoothing"): lambda k: smooth_depth(pick(depths, k)),
         (OURS, "normals"): lambda k: surface_normals(pick(points, k), window=window, step=step),
         (OURS, "convexity"): lambda k: minimum_convexity(pick(points, k), pick(normals, k)),
