@@ -89,7 +89,7 @@ def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: 
     waiting: deque[Future[Segmented]] = deque()
     try:
         for index in range(len(reader)):
-            waiting.append(pool.submit(_segment, index))
+            waiting.append(_submitted(pool, index))
             if len(waiting) >= AHEAD * workers:
                 yield waiting.popleft().result()
         while waiting:
@@ -103,6 +103,15 @@ def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: 
         ) from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _submitted(pool: ProcessPoolExecutor, index: int) -> Future[Segmented]:
+    """Hand a frame to a pool. Raises BrokenProcessPool also when a worker died while the next one was being started,
+    whose pipes are closed by then."""
+    try:
+        return pool.submit(_segment, index)
+    except (OSError, ValueError) as error:
+        raise BrokenProcessPool(str(error)) from error
 
 
 class _Opened:
