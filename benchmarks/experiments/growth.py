@@ -2,14 +2,13 @@
 
 A camera walks down an endless furnished corridor (benchmarks/corridor.py), 15 frames a square metre of floor. `growing`
 walks on; `standing` sees the same cell again and again (a third of the frames), so that the log grows and the map does
-not; `hour` walks through the same 200 m^2 36 times, 108,000 frames: an hour at 30 Hz. Frames are drawn as they are
-asked for. Cases are the frames up to which a figure is the mean since the case before; `all`: of all frames. Every arm runs
-in a process of its own. Times are processor time, which other work on the machine hardly changes;
-frames/s on a quiet machine are 1000 / wall_ms. Memory is the growth of the peak over what the process held before the
-first frame (libraries loaded, kernels compiled, frames in memory). Parts of `fuse`: overlap (which voxels of the map
-lie under a frame's segments), labels (association, counts, merging of segments), integration, regularisation (merging
-of instances, every 10 frames), extraction (once, at the end: surface, entities, files). `segment` without its network:
-geometric segments, and their fusion with the masks.
+not; `hour` walks through the same 200 m^2 36 times, 108,000 frames: an hour at 30 Hz. Cases are the frames up to which
+a figure is the mean since the case before; `all`: of all frames. Every arm runs in a process of its own. Times are
+processor time, which other work on the machine hardly changes; frames/s on a quiet machine are 1000 / wall_ms. Memory
+is the growth of the peak over what the process held before the first frame (libraries loaded, kernels compiled, frames
+in memory). Parts of `fuse`: overlap (which voxels of the map lie under a frame's segments), labels (association,
+counts, merging of segments), integration, regularisation (merging of instances, every 10 frames), extraction (once, at
+the end: surface, entities, files). `segment` without its network: geometric segments, and their fusion with the masks.
 """
 
 from __future__ import annotations

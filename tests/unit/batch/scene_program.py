@@ -2,9 +2,9 @@
 
     python scene_program.py FOLDER LOG SEED
 
-The log file holds one word and perhaps a number: `write`, `sleep 5`, `exit 3`, `outcome`, `signal 11`, `allocate 200`
-(MiB), `unsaid 6` (exits without a reason), `stubborn 30` (does not heed SIGTERM), `family 30` (a child that outlives its parent), `noise`, `fail-once`,
-`loaded` (writes whether a library was there before it was asked for).
+The log file holds one word and perhaps a number: `write`, `sleep 5`, `exit 3`, `unsaid 6` (exits without a reason),
+`outcome`, `signal 11`, `allocate 200` (MiB), `stubborn 30` (does not heed SIGTERM), `family 30` (a child that outlives
+its parent), `noise`, `fail-once`, `loaded` (writes whether a library was there before it was asked for).
 """
 
 import hashlib
