@@ -12,6 +12,7 @@ from scenewright.stages.cad.completion import inside_points
 from scenewright.stages.cad.explained import distances
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.kit.geometry.solids import Solid, hull_or_box
+from scipy.spatial import cKDTree
 
 MOST_FILLED = 0.2
 """Share of a piece that was seen that may lie in space seen to be empty, as posts are some voxels wide; of
@@ -85,8 +86,8 @@ class Reading:
     turn: np.ndarray
     """(3, 3): world from the frame of the thing."""
     free_space: FreeSpace
-    own: np.ndarray
-    """(V, 3) vertices of the thing, world [m]."""
+    own: cKDTree
+    """Of the vertices of the thing, world [m]."""
     carrying: tuple[float, ...] = ()
     """Heights at which things stand on it or in it [m]."""
 
