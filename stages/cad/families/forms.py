@@ -20,6 +20,8 @@ what is inferred, none."""
 SEEN_THROUGH, ASIDE, APRON = 0.1, 0.05, 0.1
 """Below a top, this share of the room was seen empty, so far from its edges and from top and ground [m]: what nobody
 saw through may be a box."""
+UNSURE = 0.02
+"""Where space that was seen empty ends is known to this [m]: a voxel of a map."""
 INFERRED_WORDS = "; inferred: "
 """Between what was seen of a form and what was not, in words."""
 SPACING, COARSE = 0.02, 0.05
@@ -116,9 +118,13 @@ class Reading:
         )
 
     def has_room(self, piece: Piece) -> bool:
-        """Whether a piece does not lie in space that was seen empty."""
-        share = self.filled(piece.corners)
-        return share <= MOST_FILLED if piece.seen else share == 0.0
+        """Whether a piece does not lie in space that was seen empty; of one that nobody saw, all that is farther inside
+        than where space ends is known."""
+        if piece.seen:
+            return self.filled(piece.corners) <= MOST_FILLED
+        middle, half = piece.corners.mean(axis=0), 0.5 * np.ptp(piece.corners, axis=0)
+        inside = np.maximum(half - UNSURE, 1e-4) / np.maximum(half, 1e-4)
+        return self.filled(middle + inside * (piece.corners - middle)) == 0.0
 
 
 def box_piece(name: str, low: np.ndarray, high: np.ndarray, *, seen: bool = True, carries: bool = False) -> Piece:

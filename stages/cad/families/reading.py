@@ -7,7 +7,7 @@ surface around them. What was not seen of a post's partners is mirrored about th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -155,9 +155,21 @@ def posts_below(board: Piece, reading: Reading, name: str = "leg") -> list[Piece
             corners = post.corners.copy()
             corners[:, :2] = middle + mirror * (corners[:, :2] - middle)
             partner = Piece(name, corners, False)
-            if not any(_overlap(partner, other) for other in posts) and reading.has_room(partner):
-                posts.append(partner)
+            if not any(_overlap(partner, other) for other in posts):
+                posts += next(([piece] for piece in (partner, *_thinner(partner)) if reading.has_room(piece)), [])
     return posts
+
+
+def _thinner(post: Piece) -> Iterator[Piece]:
+    """Yield the posts of the least width in a post that stands or leans: in its middle, then at its edges. What was
+    seen of a post is wider than it is, by voxels and by what depth spreads."""
+    ends = post.corners.reshape(2, 4, 3)[..., :2]
+    spare = np.maximum(np.ptp(ends, axis=1) - LEAST_POST, 0.0)[:, None]
+    for corner in (np.zeros(2), *CORNER):
+        corners = post.corners.copy()
+        middles = ends.mean(axis=1, keepdims=True) + 0.5 * corner * spare
+        corners[:, :2] = (middles + 0.5 * LEAST_POST * CORNER).reshape(8, 2)
+        yield Piece(post.name, corners, post.seen)
 
 
 def corner_legs(board: Piece, reading: Reading, width: float, beside: Sequence[Piece] = ()) -> list[Piece]:
