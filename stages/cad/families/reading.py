@@ -161,15 +161,17 @@ def posts_below(board: Piece, reading: Reading, name: str = "leg") -> list[Piece
 
 
 def _thinner(post: Piece) -> Iterator[Piece]:
-    """Yield the posts of the least width in a post that stands or leans: in its middle, then at its edges. What was
-    seen of a post is wider than it is, by voxels and by what depth spreads."""
+    """Yield thinner posts in a post that stands or leans: of the least width along one side, then along both; in its
+    middle, then at its edges. What was seen of a post is wider than it is, by voxels and by what depth spreads."""
     ends = post.corners.reshape(2, 4, 3)[..., :2]
-    spare = np.maximum(np.ptp(ends, axis=1) - LEAST_POST, 0.0)[:, None]
-    for corner in (np.zeros(2), *CORNER):
-        corners = post.corners.copy()
-        middles = ends.mean(axis=1, keepdims=True) + 0.5 * corner * spare
-        corners[:, :2] = (middles + 0.5 * LEAST_POST * CORNER).reshape(8, 2)
-        yield Piece(post.name, corners, post.seen)
+    widths = np.ptp(ends, axis=1)[:, None]
+    for along in ([True, False], [False, True], [True, True]):
+        least = np.where(along, np.minimum(widths, LEAST_POST), widths)
+        for side in (np.zeros(2), *CORNER):
+            corners = post.corners.copy()
+            middles = ends.mean(axis=1, keepdims=True) + 0.5 * side * (widths - least)
+            corners[:, :2] = (middles + 0.5 * least * CORNER).reshape(8, 2)
+            yield Piece(post.name, corners, post.seen)
 
 
 def corner_legs(board: Piece, reading: Reading, width: float, beside: Sequence[Piece] = ()) -> list[Piece]:
