@@ -1,7 +1,7 @@
-"""Ours: a model that the arrangement moved off the surface that it stands for gives the thing its mesh back.
+"""Ours: a model that does not explain what was seen of its thing gives the mesh back.
 
-What is moved aside out of its neighbours is judged again where it came to stand, by the same error as a candidate. A
-mesh is never moved so far, so it explains what was seen where the model no longer does.
+Models err in shape, and what is moved aside out of its neighbours ends beside its surface. Both are judged where a
+model came to stand, by the share of the surface that it explains. A mesh explains all of it.
 """
 
 from __future__ import annotations
@@ -14,38 +14,39 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.stages.cad.arranging import Arrangement
 from scenewright.stages.cad.candidates import Shortlist
-from scenewright.stages.cad.model_surfaces import ModelSurface, alignment_error
+from scenewright.stages.cad.carcasses import patches_of
+from scenewright.stages.cad.explained import NEAR, explained_by_model
+from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
 
 
-def moved_off(
+def unexplaining(
     graph: ContactGraphFile,
     panoptic_map: PanopticMap,
     arranged: Arrangement,
     chosen: Mapping[str, Placement],
     surfaces: Mapping[str, ModelSurface],
-    largest_error: float,
+    least: float,
 ) -> dict[str, str]:
-    """Return node -> why its model is none any more, for models that the arrangement moved aside until they lie farther
-    than `largest_error` [m] from what was seen of their thing, root mean square, and farther than before.
+    """Return node -> why its model is none any more, for models that explain less than a share `least` of what was
+    seen of their thing, where the arrangement put them.
 
     The way along with what carries it, and up or down onto it, does not count: the graph asks for these.
     """
     why = {}
     for name, placement in arranged.placements.items():
         link, mesh = graph.parent_link(name), graph.node(name).mesh
-        along, way = went(arranged, chosen, "" if link is None else link.source), went(arranged, chosen, name)
-        along = np.array([*along[:2], way[2]])
-        own = way - along
-        if mesh is None or not own.any():
+        if mesh is None or least <= 0.0:
             continue
-        points = load_entity_mesh(panoptic_map.path(mesh)).vertices
-        error = alignment_error(surfaces[placement.shape.model.id], placement, points + along)
-        before = alignment_error(surfaces[chosen[name].shape.model.id], chosen[name], points)
-        if error > max(largest_error, before):
-            moved, off = 1000 * np.linalg.norm(own), 1000 * error
-            why[name] = f"{placement.shape.model.id} would have to stand {moved:.0f} mm aside, {off:.0f} mm off"
+        way = went(arranged, chosen, name)
+        along = np.array([*went(arranged, chosen, "" if link is None else link.source)[:2], way[2]])
+        patches = patches_of(load_entity_mesh(panoptic_map.path(mesh)))
+        patches = replace(patches, points=patches.points + along)
+        share = explained_by_model(surfaces[placement.shape.model.id], placement, patches, NEAR).by_model
+        if share < least:
+            aside = 1000 * np.linalg.norm(way - along)
+            why[name] = f"{placement.shape.model.id} would explain {share:.0%}, {aside:.0f} mm aside"
     return why
 
 

@@ -56,8 +56,8 @@ class CadMethod(Protocol):
         ...
 
     @property
-    def largest_error(self) -> float:
-        """Alignment error at which a model that the arrangement moved is none any more [m]."""
+    def least_explained(self) -> float:
+        """Share of the surface of its thing under which a model is none any more."""
         ...
 
     def free_space(self, panoptic_map: PanopticMap) -> FreeSpace:

@@ -25,7 +25,7 @@ from scenewright.stages.cad.conflicts import placed_pieces
 from scenewright.stages.cad.explained import shares_of
 from scenewright.stages.cad.families.stand_in import inferred_of
 from scenewright.stages.cad.free_space import FreeSpace
-from scenewright.stages.cad.giving_back import given_back, moved_off
+from scenewright.stages.cad.giving_back import given_back, unexplaining
 from scenewright.stages.cad.joint_evidence import Looked, joint_evidence
 from scenewright.stages.cad.made_models import is_built_in, is_of_family
 from scenewright.stages.cad.method import CadMethod
@@ -104,7 +104,7 @@ def choose_and_write(
             obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
         levels = floor_levels(graph, context.output / "layout")
         arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
-        while off := moved_off(graph, panoptic_map, arranged, chosen, surfaces, method.largest_error):
+        while off := unexplaining(graph, panoptic_map, arranged, chosen, surfaces, method.least_explained):
             chosen = {name: placement for name, placement in chosen.items() if name not in off}
             shortlists |= {name: given_back(shortlists[name], why) for name, why in off.items()}
             obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
