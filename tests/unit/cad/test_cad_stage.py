@@ -182,8 +182,8 @@ def test_what_has_no_candidate_keeps_its_mesh(replace_objects):
 
 
 def test_children_need_a_surface(replace_objects):
-    """A table with a second tier at 0.3 m that carries a box; no table of the library has one."""
-    tiers = [box_mesh((-0.7, -0.35, 0.7), (0.7, 0.35, 0.74)), box_mesh((-0.7, -0.35, 0.26), (0.7, 0.35, 0.3))]
+    """A table with a small second tier at 0.3 m that carries a box; no table of the library has one."""
+    tiers = [box_mesh((-0.7, -0.35, 0.7), (0.7, 0.35, 0.74)), box_mesh((-0.2, -0.2, 0.26), (0.2, 0.2, 0.3))]
     legs = [box_mesh((x, y, 0), (x + 0.05, y + 0.05, 0.7)) for x in (-0.7, 0.65) for y in (-0.35, 0.3)]
     meshes = {
         1: floor_mesh(),
