@@ -147,10 +147,11 @@ def test_what_cannot_be_done_says_why_with_numbers(body: PhysicsBody) -> None:
     body.look(ABOVE, close=False)
     nothing = body.grasp((2.6, 2.6, 0.76), "apple", 0)
     assert not nothing.ok and nothing.failure is not None and nothing.failure.kind == "no_grasp"
+    assert not body.grasp((2.0, 2.3, 0.78), "apple", 0, most=0).ok, "no grasp of it may be tried"
     plate = body.grasp((2.3, 2.3, 0.75), "plate", 0)
     assert not plate.ok and plate.failure is not None
     assert plate.failure.numbers["width"] > plate.failure.numbers["opening"]
-    assert body.bodies["plate_0"].on != "" and [e.ok for e in body.events] == [False, False]
+    assert body.bodies["plate_0"].on != "" and [e.ok for e in body.events] == [False, False, False]
 
 
 def test_a_world_is_its_seed() -> None:

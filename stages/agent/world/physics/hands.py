@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.stages.agent.senses import CANDIDATES
 from scenewright.stages.agent.world.physics.beliefs import Beliefs, Box, Hold
 from scenewright.stages.agent.world.physics.eyes import Surface
 from scenewright.stages.agent.world.physics.grasps import (
@@ -30,8 +31,6 @@ from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
 
-CANDIDATES = 40
-"""Grasps that are tried, those from above first: eight of each of five pitches; Han 2024, 3.3.3, has 20 from above."""
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
 APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
@@ -108,9 +107,10 @@ def pointing(heading: float, pitch: float) -> np.ndarray:
 
 
 def plan_grasp(
-    beliefs: Beliefs, base: np.ndarray, arm: np.ndarray, target: Target, random: np.random.Generator
+    beliefs: Beliefs, base: np.ndarray, arm: np.ndarray, target: Target, random: np.random.Generator, most: int
 ) -> Motion:
-    """Return the motion that takes a fused surface. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
+    """Return the motion that takes a fused surface, `most` grasps tried. Raises MotionFailed: `no_grasp`, or what ended
+    most attempts."""
     surface, name = target.surface, target.name
     possible = grasps_of(target, base, Jaws.of(beliefs.description))
     if not possible:
@@ -122,7 +122,7 @@ def plan_grasp(
             {"width": width, "opening": opening},
         )
     left_out = target.rank * NEXT % len(possible)  # where few are possible, the first has its turn again
-    grasps = (possible[left_out:] + possible[:left_out])[:CANDIDATES]
+    grasps = (possible[left_out:] + possible[:left_out])[:most]
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     attempts = (_one_grasp(planner, base, arm, target, grasp, tally) for grasp in grasps)
     motion = first_motion(attempts, SEARCHES)
