@@ -8,25 +8,25 @@ import numpy as np
 from scenewright.stages.agent.senses import CANDIDATES
 from scenewright.stages.agent.world.physics.beliefs import Beliefs, Box, Hold
 from scenewright.stages.agent.world.physics.eyes import Surface
-from scenewright.stages.agent.world.physics.grasps import (
+from scenewright.stages.kit.acting.hand.attempts import first_motion
+from scenewright.stages.kit.acting.hand.grip import hand_axes, narrowest_width
+from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
+from scenewright.stages.kit.acting.hand.seen_grasps import (
     FORWARD_PITCHES,
+    FROM_ABOVE,
     MARGIN,
-    PITCHES,
     STRAIGHT,
     TIGHT,
     Jaws,
     antipodal_grasps,
     within_reach,
 )
-from scenewright.stages.kit.acting.hand.attempts import first_motion
-from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from scenewright.stages.kit.motion.cartesian import drawn_back, raised
 from scenewright.stages.kit.motion.failures import MotionFailed
-from scenewright.stages.kit.motion.grasps import narrowest_width
 from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_starts
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
@@ -99,10 +99,8 @@ def reachable(
 
 def pointing(heading: float, pitch: float) -> np.ndarray:
     """Return a tool pose (4, 4) at the origin that comes along a heading, `pitch` [rad] downwards."""
-    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
-    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
     pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([np.cross(closing, approach), closing, approach])
+    pose[:3, :3] = hand_axes(heading, pitch)
     return pose
 
 
@@ -145,7 +143,7 @@ def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
     keep = _inside(surface)
     points, normals = surface.points[keep], surface.normals[keep]
     inside, heading = target.behind > 0, np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    pitches = FORWARD_PITCHES if inside or target.level else PITCHES
+    pitches = FORWARD_PITCHES if inside or target.level else FROM_ABOVE
     for margin in (MARGIN, TIGHT):
         grasps = antipodal_grasps(points, normals, jaws, target.floor, pitches, margin)
         grasps = within_reach(grasps, target.inward, STRAIGHT) if inside else within_reach(grasps, heading)

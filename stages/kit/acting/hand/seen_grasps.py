@@ -1,7 +1,7 @@
 """Antipodal grasps on what the cameras saw of a thing: noisy points of the sides that were in view, none of the back.
 
-The kit's `sample_grasps` asks both fingers for a square contact within 3 mm, as surfaces of models have it. Here one
-side that was seen to face a finger is enough: of the other one it is believed that it is as the first.
+`sample_grasps` asks both fingers for a square contact within 3 mm, as surfaces of models have it. Here one side that
+was seen to face a finger is enough: of the other one it is believed that it is as the first.
 """
 
 from __future__ import annotations
@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import FINGER_BAND, FINGER_DEPTH, PITCHES, hand_axes
 from scenewright.stages.kit.geometry.boxes import minimum_rectangle
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
-FINGER_DEPTH = 0.032
-"""How far the tool point goes in behind the front of a thing [m]."""
-FINGER_BAND = 0.011
-"""Half the breadth of a finger tip [m], and how far before and behind the tool point the fingers press."""
 MARGIN, TIGHT = 0.012, 0.005
 """Room between the open fingers and the thing, both sides together [m]: as wanted, and where nothing leaves as much. A
 near look tells the middle of what is 7 cm wide to 3 mm."""
@@ -30,7 +27,7 @@ LEAST = 10
 """Points between the fingers."""
 HEADINGS = 16
 """Headings of the hand that are tried all around, beside those along the sides of what was seen; by eye."""
-PITCHES = (np.pi / 2, 1.1, 0.7, 0.35, 0.0)
+FROM_ABOVE = PITCHES[::-1]
 """How steeply the hand comes, from above first [rad]: the flatter, the farther the arm reaches over a table."""
 FORWARD_PITCHES = (0.15, 0.0, 0.35)
 """Pitches of the hand that goes into a shelf [rad], in the order in which they are tried."""
@@ -73,7 +70,7 @@ def antipodal_grasps(
     normals: np.ndarray,
     jaws: Jaws,
     floor: float,
-    pitches: tuple[float, ...] = PITCHES,
+    pitches: tuple[float, ...] = FROM_ABOVE,
     margin: float = MARGIN,
 ) -> list[np.ndarray]:
     """Return map_from_tool (4, 4) of grasps of points (N, 3) with normals, of the first pitch first, where the fingers
@@ -117,9 +114,8 @@ def _grasp_at(
 ) -> tuple[np.ndarray, float, float] | None:
     """Return map_from_tool (4, 4) with the tool at a point, how squarely the fingers meet the surface, and the width
     [m] there; None where it is too wide or in the way of the palm."""
-    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
-    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
-    axes = np.column_stack([np.cross(closing, approach), closing, approach])
+    axes = hand_axes(heading, pitch)
+    _, closing, approach = np.ascontiguousarray(axes.T)
     aside, along, depth = ((points - at) @ axes).T
     level, near, deepest = pitch < LEVEL, np.abs(aside) < FINGER_BAND, FINGER_DEPTH - BEFORE_PALM
     front = float(np.percentile(depth[near], 3)) if level and near.any() else 0.0
