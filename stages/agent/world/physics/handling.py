@@ -209,11 +209,9 @@ class Handling:
         if released is not None:
             self._robot.room.moved[released] += 1
         back = np.concatenate([self._robot.arm[None], motion.away[0].path[:, 3:]])
-        rows = whole_body(self._robot.true_base(), back)
+        first = replace(motion.away[0], path=whole_body(self._robot.believed, back))
         try:
-            self._robot.carry_out(
-                (Segment(rows, self._robot.description.opening, motion.away[0].pace), *motion.away[1:])
-            )
+            self._robot.carry_out((first, *motion.away[1:]))
         except MotionFailed:
             self._robot.draw_in()  # it let go already: what became of it is for the eyes
         self._robot.driver.wait(0.5)
