@@ -17,7 +17,6 @@ from scenewright.stages.kit.acting.hand.seen_grasps import (
     MARGIN,
     STRAIGHT,
     TIGHT,
-    Jaws,
     antipodal_grasps,
     within_reach,
 )
@@ -30,6 +29,7 @@ from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_starts
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
@@ -110,7 +110,7 @@ def plan_grasp(
     """Return the motion that takes a fused surface, `most` grasps tried. Raises MotionFailed: `no_grasp`, or what ended
     most attempts."""
     surface, name = target.surface, target.name
-    possible = grasps_of(target, base, Jaws.of(beliefs.description))
+    possible = grasps_of(target, base, beliefs.description)
     if not possible:
         opening, width = beliefs.description.opening, narrowest_width(surface.points[_inside(surface)])
         raise MotionFailed(
@@ -133,11 +133,11 @@ def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.ran
     """Whether the hand gets straight to some grasp of a fused surface from a base pose (3,) and up again, free of all
     that is in the map."""
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
-    carry, grasps = beliefs.description.carry, grasps_of(target, base, Jaws.of(beliefs.description))[:CANDIDATES]
+    carry, grasps = beliefs.description.carry, grasps_of(target, base, beliefs.description)[:CANDIDATES]
     return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
 
 
-def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
+def grasps_of(target: Target, base: np.ndarray, robot: RobotDescription) -> list[np.ndarray]:
     """Return the grasps of what was seen, map_from_tool (4, 4), that an arm on a base pose (3,) may get at."""
     surface = target.surface
     keep = _inside(surface)
@@ -145,7 +145,7 @@ def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
     inside, heading = target.behind > 0, np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
     pitches = FORWARD_PITCHES if inside or target.level else FROM_ABOVE
     for margin in (MARGIN, TIGHT):
-        grasps = antipodal_grasps(points, normals, jaws, target.floor, pitches, margin)
+        grasps = antipodal_grasps(points, normals, robot, target.floor, pitches, margin)
         grasps = within_reach(grasps, target.inward, STRAIGHT) if inside else within_reach(grasps, heading)
         if grasps:
             break
