@@ -173,11 +173,15 @@ def _between(level: np.ndarray, low: float, high: float) -> np.ndarray:
 
 def _legs(points: np.ndarray, rests_at: float, room: Room) -> list[np.ndarray]:
     """Return legs from points (N, 3) down to `rests_at` [m]: where there is room, the farthest out towards the four
-    corners. What reaches the ground there is a leg already."""
-    cells, number = np.unique(np.floor(points[:, :2] / LEG).astype(np.int64), axis=0, return_inverse=True)
+    corners, within the bounds of the points. What reaches the ground there is a leg already."""
+    least, extent = points[:, :2].min(axis=0), np.ptp(points[:, :2], axis=0)
+    counts = np.maximum(1, extent / LEG + 1e-9).astype(np.int64)
+    width = np.maximum(extent / counts, 1e-9)
+    within = np.minimum((points[:, :2] - least) / width, counts - 1).astype(np.int64)
+    cells, number = np.unique(within, axis=0, return_inverse=True)
     lowest = np.full(len(cells), np.inf)
     np.minimum.at(lowest, number.ravel(), points[:, 2])
-    middles = (cells + 0.5) * LEG
+    middles = least + (cells + 0.5) * width
     spread = middles - middles.mean(axis=0)
     spread /= np.maximum(np.ptp(spread, axis=0), LEG)
     ground = rests_at + FOOT_THICKNESS

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-import open3d as o3d
 from scenewright.schemas.cad_scene import Explained
 from scenewright.schemas.scene_parts import SurfacePlane
 from scenewright.stages.cad.carcasses import Patches
@@ -18,7 +17,7 @@ from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.surroundings import compact
 from scenewright.stages.kit.formats.cad_models import part_transforms
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
-from scenewright.stages.kit.geometry.ray_scenes import triangles_of
+from scenewright.stages.kit.geometry.nearest_triangles import nearest_triangles, tree_of
 from scenewright.stages.kit.geometry.transforms import apply
 
 NEAR = 0.02
@@ -66,8 +65,7 @@ def placed_triangles(surface: ModelSurface, placement: Placement) -> list[Triang
     """Return the triangles of a placed model, a part each."""
     poses = part_transforms(surface.model, placement.shape.joints)
     return [
-        (to_world(placement, apply(poses[part], triangles.vertices.astype(float))), triangles.faces)
-        for part, triangles in surface.surfaces.items()
+        (to_world(placement, apply(poses[part], vertices)), faces) for part, (vertices, faces) in surface.meshes.items()
     ]
 
 
@@ -91,10 +89,7 @@ def distances(points: np.ndarray, stands: Sequence[Triangles]) -> np.ndarray:
     firsts = np.cumsum([0, *(len(vertices) for vertices, _ in kept)])
     vertices = np.concatenate([vertices for vertices, _ in kept])
     faces = np.concatenate([faces.astype(np.int64) + first for (_, faces), first in zip(kept, firsts, strict=False)])
-    scene = triangles_of(vertices, faces).scene
-    return np.asarray(
-        scene.compute_distance(o3d.core.Tensor.from_numpy(np.ascontiguousarray(points, np.float32))).numpy()
-    )
+    return nearest_triangles(tree_of(vertices, faces), points).distance
 
 
 def shares_of(explained: Mapping[str, Explained]) -> dict[str, float]:

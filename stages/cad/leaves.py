@@ -84,8 +84,8 @@ def leaf_of(surface: ModelSurface, joint: Joint, scale: float) -> Leaf | None:
     low, high = all_corners.min(axis=0), all_corners.max(axis=0)
     own_low, own_high = corners[joint.part].min(axis=0), corners[joint.part].max(axis=0)
     axis, sign = _opening_side(joint, scale, own_low, own_high)
-    triangles = surface.surfaces[joint.part]
-    faces = scale * apply(poses[joint.part], triangles.vertices.astype(float))[triangles.faces]
+    vertices, triangles = surface.meshes[joint.part]
+    faces = scale * apply(poses[joint.part], vertices)[triangles]
     cross = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1)
     facing = sign * cross[:, axis] > 2 * FACES * area

@@ -9,14 +9,20 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import open3d as o3d
 import trimesh
 from scenewright.schemas.cad_library import CadModel
 from scenewright.stages.cad.shapes import Placement
+from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
 from scenewright.stages.kit.formats.part_colors import vertex_colors
-from scenewright.stages.kit.geometry.ray_scenes import Triangles, triangles_of
-from scenewright.stages.kit.geometry.transforms import apply, inverse
+from scenewright.stages.kit.geometry.nearest_triangles import (
+    TriangleTree,
+    forest_of,
+    nearest_below,
+    nearest_triangles,
+    tree_of,
+)
+from scenewright.stages.kit.geometry.transforms import apply
 
 SAMPLES = 300
 """Points that stand for the surface of a model where it is compared with free space."""
@@ -24,6 +30,8 @@ PLAIN = 153
 """Grey of a part without colours (sRGB, 0 to 255)."""
 FACING = 0.5
 """Cosine within which a triangle belongs to a side."""
+SIDES = 6
+"""Sides of a part: -x, +x, -y, +y, -z, +z of its frame."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +73,13 @@ class ModelSurface:
     """
 
     model: CadModel
-    surfaces: dict[str, Triangles]
-    """Part -> its visual mesh."""
-    sides: dict[str, dict[int, Triangles]]
-    """Part -> side (0 to 5: -x, +x, -y, +y, -z, +z of the part frame) -> the triangles that face that way."""
-    numbers: dict[str, dict[int, np.ndarray]]
-    """... and which of the part's triangles they are."""
+    meshes: dict[str, tuple[np.ndarray, np.ndarray]]
+    """Part -> vertices (V, 3) and faces (F, 3) of its visual mesh, part frame."""
+    forest: TriangleTree
+    """Trees over the triangles of the parts, part frames; triangles are told by their number in the part."""
+    roots: np.ndarray
+    """(P, 7): for each part the trees of the triangles that face -x, +x, -y, +y, -z, +z of the part frame (-1: none do)
+    and that of all."""
     corners: dict[str, np.ndarray]
     """Part -> hull vertices (K, 3) of the visual mesh, part frame; they bound the part in every pose."""
     read_pieces: Callable[[], Mapping[str, Sequence[trimesh.Trimesh]]]
@@ -85,11 +94,6 @@ class ModelSurface:
         collision = self.read_pieces()
         return {part: tuple(collision.get(part, [])) for part in self.model.parts}
 
-    @cached_property
-    def bounds(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Part -> least and largest coordinates (3,) of its visual mesh, part frame."""
-        return {part: (corners.min(axis=0), corners.max(axis=0)) for part, corners in self.corners.items()}
-
     def closest(self, points: np.ndarray, joints: dict[str, float], normals: np.ndarray | None = None) -> Nearest:
         """Return the nearest surface points of points (N, 3) in the model frame at scale 1.
 
@@ -97,48 +101,16 @@ class ModelSurface:
         axis of the part frame that its normal is nearest to; any triangle where the part has none such). A cabinet's
         observed top is closer to the underside of a top board two centimetres too high than to the board's top.
         """
-        distance = np.full(len(points), np.inf)
-        nearest, normal = np.zeros((len(points), 3)), np.zeros((len(points), 3))
-        part_index, triangle = np.zeros(len(points), dtype=int), np.zeros(len(points), dtype=int)
         transforms = part_transforms(self.model, joints)
-        for k, part in enumerate(self.model.parts):
-            model_from_part = transforms[part]
-            local = apply(inverse(model_from_part), points).astype(np.float32)
-            # Only points that may come closer than to the parts before.
-            low, high = self.bounds[part]
-            outside = np.maximum(np.maximum(low - local, 0.0), local - high)
-            in_reach = np.flatnonzero(np.linalg.norm(outside, axis=1) < distance)
-            if len(in_reach) == 0:
-                continue
-            groups: list[tuple[int | None, np.ndarray]] = [(None, in_reach)]
-            if normals is not None:
-                side = facing_side(normals[in_reach] @ model_from_part[:3, :3])
-                groups = [(int(value), in_reach[side == value]) for value in np.unique(side)]
-            for value, rows in groups:
-                all_sides = self.surfaces[part]
-                asked_of = all_sides if value is None else self.sides[part].get(value, all_sides)
-                answer = asked_of.scene.compute_closest_points(
-                    o3d.core.Tensor.from_numpy(np.ascontiguousarray(local[rows]))
-                )
-                foot = answer["points"].numpy().astype(float)
-                gap = np.linalg.norm(local[rows] - foot, axis=1)
-                closer = gap < distance[rows]
-                chosen = rows[closer]
-                distance[chosen], part_index[chosen] = gap[closer], k
-                nearest[chosen] = apply(model_from_part, foot[closer])
-                facing = answer["primitive_normals"].numpy()[closer].astype(float)
-                normal[chosen] = facing @ model_from_part[:3, :3].T
-                hit = answer["primitive_ids"].numpy()[closer].astype(int)
-                triangle[chosen] = hit if asked_of is all_sides or value is None else self.numbers[part][value][hit]
-        return Nearest(distance, nearest, normal, part_index, triangle)
+        poses = np.array([transforms[part] for part in self.model.parts])
+        facing = np.empty((0, 3)) if normals is None else np.ascontiguousarray(normals, dtype=float)
+        return Nearest(*_closest(self.forest, self.roots, poses, np.ascontiguousarray(points, dtype=float), facing))
 
     def part_distance(self, points: np.ndarray, normal: np.ndarray, part: str) -> float:
         """Return the largest distance of points (N, 3), in the part's frame, to triangles of the part that face the
         way of `normal` (3,); inf when it has none."""
-        side = self.sides[part].get(int(facing_side(normal[None])[0]))
-        if side is None:
-            return float("inf")
-        return float(side.scene.compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32))).numpy().max())
+        root = self.roots[self.model.parts.index(part), facing_side(normal[None])[0]]
+        return float(nearest_triangles(self.forest, points, root).distance.max()) if root >= 0 else float("inf")
 
     def hull_points(self, joints: dict[str, float]) -> np.ndarray:
         """Return points (K, 3) in the model frame at scale 1 whose bounds are those of the posed model."""
@@ -170,6 +142,45 @@ class ModelSurface:
         ]
 
 
+@compiled
+def _closest(
+    forest: TriangleTree, roots: np.ndarray, model_from_part: np.ndarray, points: np.ndarray, normals: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the fields of `Nearest` for parts with poses (P, 4, 4) in the model; normals (N, 3), or (0, 3) for any."""
+    distance, parts, triangles = (
+        np.full(len(points), np.inf),
+        np.zeros(len(points), np.int64),
+        np.zeros(len(points), np.int64),
+    )
+    nearest, facing = np.zeros((len(points), 3)), np.zeros((len(points), 3))
+    local, normal, foot, candidate = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for k in range(len(points)):
+        for part in range(len(model_from_part)):
+            pose = model_from_part[part]
+            for axis in range(3):
+                local[axis] = normal[axis] = 0.0
+                for other in range(3):
+                    local[axis] += pose[other, axis] * (points[k, other] - pose[other, 3])
+                    if len(normals):
+                        normal[axis] += pose[other, axis] * normals[k, other]
+            root = roots[part, SIDES]
+            if len(normals):
+                axis = np.argmax(np.abs(normal))
+                root = roots[part, 2 * axis + (1 if normal[axis] > 0.0 else 0)]
+                if root < 0:
+                    root = roots[part, SIDES]
+            found, row = nearest_below(forest, root, local, distance[k], foot, candidate)
+            if row < 0:
+                continue
+            distance[k], parts[k], triangles[k] = found, part, forest.numbers[row]
+            for axis in range(3):
+                nearest[k, axis], facing[k, axis] = pose[axis, 3], 0.0
+                for other in range(3):
+                    nearest[k, axis] += pose[axis, other] * foot[other]
+                    facing[k, axis] += pose[axis, other] * forest.normals[row, other]
+    return distance, nearest, facing, parts, triangles
+
+
 def facing_side(normals: np.ndarray) -> np.ndarray:
     """Return the side (N,) that normals (N, 3) face: 2 * axis, + 1 when they point along the axis."""
     axis = np.argmax(np.abs(normals), axis=1)
@@ -188,28 +199,32 @@ def surface_of(
 ) -> ModelSurface:
     """Return the surface of a model with these meshes of its parts, part frames; `collision` is called if its pieces
     are asked for."""
-    surfaces, corners = {}, {}
-    sides: dict[str, dict[int, Triangles]] = {}
-    numbers: dict[str, dict[int, np.ndarray]] = {}
-    for part in model.parts:
-        vertices, faces = np.asarray(visual[part].vertices), np.asarray(visual[part].faces)
-        surfaces[part] = triangles_of(vertices, faces)
+    meshes, corners = {}, {}
+    trees: list[TriangleTree] = []
+    places = np.full((len(model.parts), SIDES + 1), -1)
+    for k, part in enumerate(model.parts):
+        vertices, faces = np.asarray(visual[part].vertices, dtype=float), np.asarray(visual[part].faces)
+        meshes[part] = vertices, faces
         triangles = vertices[faces]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-18)
-        sides[part], numbers[part] = {}, {}
-        for side in range(6):
-            facing = np.flatnonzero(normals[:, side // 2] * (1.0 if side % 2 else -1.0) >= FACING)
-            if len(facing):
-                sides[part][side], numbers[part][side] = triangles_of(vertices, faces[facing]), facing
+        for side in range(SIDES + 1):
+            toward = normals[:, side // 2 % 3] * (1.0 if side % 2 else -1.0)
+            chosen = np.flatnonzero(toward >= FACING) if side < SIDES else np.arange(len(faces))
+            if len(chosen):
+                places[k, side] = len(trees)
+                trees.append(tree_of(vertices, faces[chosen], chosen))
         corners[part] = np.asarray(visual[part].convex_hull.vertices)
+    forest, roots = forest_of(trees)
     areas = {part: float(visual[part].area) for part in model.parts}
     samples = {}
     for k, part in enumerate(model.parts):
         count = max(1, round(SAMPLES * areas[part] / max(sum(areas.values()), 1e-12)))
         samples[part] = np.asarray(trimesh.sample.sample_surface(visual[part], count, seed=k)[0])
     looks = {part: look_of(visual[part]) for part in model.parts}
-    return ModelSurface(model, surfaces, sides, numbers, corners, collision, samples, looks)
+    return ModelSurface(
+        model, meshes, forest, np.where(places < 0, -1, roots[places]), corners, collision, samples, looks
+    )
 
 
 def look_of(mesh: trimesh.Trimesh) -> Look:

@@ -125,7 +125,7 @@ STAGE = Stage(
         "articulations": Optionally(Articulations),
     },
     writes=CadScene,
-    libraries=("numpy", "scipy", "trimesh", "open3d", "python-fcl"),
+    libraries=("numpy", "scipy", "trimesh", "python-fcl", "numba"),
     example="scenewright cad --contact-graph outputs/demo/contact_graph --panoptic-map outputs/demo/panoptic_map "
     "--library outputs/demo/cad_library --out outputs/demo/cad_scene",
     estimate=grows_with("panoptic_map", 0.6, 0.28, 490, 0.0),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
@@ -22,7 +24,8 @@ def transform_from_quaternion(quaternion_xyzw: np.ndarray, translation: np.ndarr
 
 def transform_from_yaw(yaw: float, translation: np.ndarray) -> np.ndarray:
     """Build (4, 4) target_from_source that turns by `yaw` [rad] about z, then shifts by `translation` [m]."""
-    return transform_from(Rotation.from_euler("z", yaw).as_matrix(), translation)
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return transform_from(np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]), translation)
 
 
 def quaternion_of(target_from_source: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ from scenewright.stages.segment.backends.network.features import (
     resized,
 )
 from scenewright.stages.segment.backends.network.grouping import GroupingSettings, Named, group, raise_to_depth
+from scenewright.stages.segment.backends.network.model import fold_normalization
 from scenewright.stages.segment.backends.network.weights import BUNDLED, Checkpoint, load_checkpoint
 from scenewright.stages.segment.choice import BackendRequest
 from scenewright.stages.segment.geometric import GeometricFrame
@@ -81,6 +82,7 @@ def _one_thread() -> Iterator[None]:
 def load_predictor(path: Path, vocabulary: Vocabulary, settings: GroupingSettings | None = None) -> Predictor:
     """Read a checkpoint for use. Raises BadInput as load_checkpoint does."""
     checkpoint = load_checkpoint(path, vocabulary)
+    fold_normalization(checkpoint.network)
     entries = [vocabulary.by_name(name) for name in checkpoint.classes]
     classes = tuple(Named(entry.id, entry.kind == "thing") for entry in entries)
     unnamed = checkpoint.classes.index(UNNAMED) if UNNAMED in checkpoint.classes else None

@@ -9,10 +9,12 @@ much about what stands in it (Zhao et al. 2017).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import torch
 from torch import nn
 from torch.nn import functional
+from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 OFFSET_UNIT = 16.0
 """The last layer speaks of offsets in this unit [output pixels]: what it has to reach then lies around 1."""
@@ -34,6 +36,20 @@ def _convolution(inputs: int, outputs: int, *, kernel: int = 3, stride: int = 1)
         nn.BatchNorm2d(outputs),
         nn.ReLU(inplace=True),
     )
+
+
+def fold_normalization(network: nn.Module) -> nn.Module:
+    """Let the convolutions of a network in evaluation do the work of the batch normalisations behind them; returns it.
+
+    The same function but for rounding, in four fifths of the time (Jacob et al. 2018, section 3.2).
+    """
+    for module in network.modules():
+        if isinstance(module, nn.Sequential):
+            for place, (convolution, normalization) in enumerate(pairwise(list(module))):
+                if isinstance(convolution, nn.Conv2d) and isinstance(normalization, nn.BatchNorm2d):
+                    module[place] = fuse_conv_bn_eval(convolution, normalization)
+                    module[place + 1] = nn.Identity()
+    return network
 
 
 class ResidualBlock(nn.Module):
