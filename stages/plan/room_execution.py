@@ -231,11 +231,9 @@ def execute(
 def _robot(
     world: PhysicsWorld, model: WorldModel, start: Configuration, parameters: PlanParameters, context: Context
 ) -> PhysicalRobot:
-    # A hand's fingers go together: with a motor each, what they hold is free to slide between them by centimetres.
-    description = replace(model.description, coupled_fingers=True)
     if parameters.eyes == "true":
-        return PhysicalRobot(world, description, start, RECORD_RATE)
-    return ErringRobot(world, description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
+        return PhysicalRobot(world, model.description, start, RECORD_RATE)
+    return ErringRobot(world, model.description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
 
 
 @dataclass(frozen=True)

@@ -72,9 +72,7 @@ class RobotInRoom:
         self.believed = np.array([x, y, yaw])
         self.arm = self.description.carry
         start = Configuration(self.believed, self.arm, self.description.opening)
-        # a hand's fingers go together: with a motor each, what they hold slides between them by centimetres
-        hand = replace(self.description, coupled_fingers=True)
-        self.driver = ErringRobot(room.world, hand, start, 1.0, self.random)
+        self.driver = ErringRobot(room.world, self.description, start, 1.0, self.random)
         self.driver.put_as_believed(start)
         self.hold: Hold | None = None
         """What it believes to hold."""
