@@ -105,10 +105,6 @@ class RobotInRoom:
         """Return where it stands (3,), true frame."""
         return self.driver.robot.configuration().base
 
-    def map_from_true(self) -> np.ndarray:
-        """Return the transform (4, 4) of localisation's error."""
-        return base_pose(self.believed, self.description) @ inverse(base_pose(self.true_base(), self.description))
-
     @property
     def home(self) -> np.ndarray:
         """Arm (J,) with which it drives."""
