@@ -20,7 +20,7 @@ from benchmarks.board.inputs import RUNGS, Generator
 from benchmarks.board.tasks.drawing import KINDS
 from benchmarks.board.tasks.measuring import RECIPE, RUNG
 from benchmarks.board.tasks.running import TaskRecord, TaskRoom, run_true_room
-from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Trial
+from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Share, Trial
 
 TASKS = "tasks"
 ARMS = {
@@ -76,7 +76,7 @@ def of_kind(kind: str, record: RoomTasks) -> RoomTasks | None:
 
 def share(of: Callable[[TaskRecord], bool]) -> Measure:
     """Return the share of tasks of which something holds, intervals over rooms."""
-    return Measure(Pooled(lambda record: (float(sum(map(of, record.tasks))), float(len(record.tasks)))))
+    return Measure(Share(lambda record: (float(sum(map(of, record.tasks))), float(len(record.tasks)))))
 
 
 def write_failures(results: Results) -> None:
