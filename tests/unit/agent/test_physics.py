@@ -19,10 +19,10 @@ from scenewright.stages.agent.world.physics.apartment_room import ApartmentRoom
 from scenewright.stages.agent.world.physics.beliefs import Beliefs
 from scenewright.stages.agent.world.physics.body import PhysicsBody
 from scenewright.stages.agent.world.physics.eyes import Surface, fuse
+from scenewright.stages.agent.world.physics.grasps import FORWARD_PITCHES, LEVEL, antipodal_grasps, within_reach
 from scenewright.stages.agent.world.physics.hands import Target, grasps_of, whole_box
 from scenewright.stages.agent.world.physics.head import SeenPiece, enter, steady
 from scenewright.stages.agent.world.physics.looking_arm import looking_arm, turned
-from scenewright.stages.kit.acting.hand.seen_grasps import FORWARD_PITCHES, LEVEL, antipodal_grasps, within_reach
 from scenewright.stages.kit.geometry.transforms import apply, transform_from_yaw
 from scenewright.stages.kit.motion.kinematics import forward
 from scenewright.stages.kit.simulation.robot import Configuration

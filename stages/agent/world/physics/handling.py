@@ -8,12 +8,12 @@ from math import hypot
 import numpy as np
 from scenewright.stages.agent.senses import CANDIDATES, Base, Felt, Position, Take
 from scenewright.stages.agent.world.physics.eyes import Surface
+from scenewright.stages.agent.world.physics.grasps import LEVEL
 from scenewright.stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
 from scenewright.stages.agent.world.physics.letting_go import DROP, JUST_OVER, SOME_WAY_OVER, Spot, plan_release
 from scenewright.stages.agent.world.physics.looking import Looking
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom, felt
 from scenewright.stages.agent.world.physics.seen import FLOOR, FOUND_WITHIN, Seen
-from scenewright.stages.kit.acting.hand.seen_grasps import LEVEL
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.segments import Segment, whole_body

@@ -8,10 +8,7 @@ import numpy as np
 from scenewright.stages.agent.senses import CANDIDATES
 from scenewright.stages.agent.world.physics.beliefs import Beliefs, Box, Hold
 from scenewright.stages.agent.world.physics.eyes import Surface
-from scenewright.stages.kit.acting.hand.attempts import first_motion
-from scenewright.stages.kit.acting.hand.grip import hand_axes, narrowest_width
-from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
-from scenewright.stages.kit.acting.hand.seen_grasps import (
+from scenewright.stages.agent.world.physics.grasps import (
     FORWARD_PITCHES,
     FROM_ABOVE,
     MARGIN,
@@ -20,6 +17,9 @@ from scenewright.stages.kit.acting.hand.seen_grasps import (
     antipodal_grasps,
     within_reach,
 )
+from scenewright.stages.kit.acting.hand.attempts import first_motion
+from scenewright.stages.kit.acting.hand.grip import hand_axes, narrowest_width
+from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally

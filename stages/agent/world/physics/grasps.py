@@ -1,7 +1,7 @@
 """Antipodal grasps on what the cameras saw of a thing: noisy points of the sides that were in view, none of the back.
 
-`sample_grasps` asks both fingers for a square contact within 3 mm, as surfaces of models have it. Here one side that
-was seen to face a finger is enough: of the other one it is believed that it is as the first.
+The kit's `sample_grasps` asks both fingers for a square contact within 3 mm, as surfaces of models have it. Here one
+side that was seen to face a finger is enough: of the other one it is believed that it is as the first.
 """
 
 from __future__ import annotations
