@@ -13,7 +13,7 @@ import numpy as np
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
 from scenewright.stages.kit.motion.robot_errors import encoder_errors, stop_error
-from scenewright.stages.kit.motion.segments import Segment
+from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration, base_pose
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.world import PhysicsWorld
@@ -35,27 +35,30 @@ class ErringRobot(PhysicalRobot):
     ) -> None:
         super().__init__(world, description, start, record_rate)
         self._random = random
-        self._encoders = encoder_errors(random, len(start.arm))
+        self.encoders = encoder_errors(random, len(start.arm))
+        """How the joints stand beside what is told of them (J,) [rad]."""
         self.error = np.zeros(3)
         """What is believed of the base less what is true, as of the last stop."""
 
-    def believed(self) -> Configuration:
-        """Return where base and arm stand by localisation and encoders."""
-        true = self.robot.configuration()
-        return Configuration(true.base + self.error, true.arm - self._encoders, true.opening)
+    def measured_arm(self) -> np.ndarray:
+        """Return the joint values (J,) by the encoders."""
+        return self.robot.configuration().arm - self.encoders
 
-    def put_as_believed(self, configuration: Configuration) -> None:
-        """Put the robot where localisation and encoders say that it stands at a configuration."""
-        base, arm = configuration.base - self.error, configuration.arm + self._encoders
-        self.put(Configuration(base, arm, configuration.opening))
+    def put_arm(self, arm: np.ndarray, opening: float) -> None:
+        """Put the arm at values (J,) by the encoders, where the base stands, and the fingers at an opening [m]."""
+        self.put(Configuration(self.robot.configuration().base, arm + self.encoders, opening))
+
+    def move_arm(self, segment: Segment, base: np.ndarray) -> None:
+        """Move the arm along a segment as far as its joints tell, the base (3,) truly held. Raises MotionFailed."""
+        self.follow_truly(replace(segment, path=whole_body(base, segment.path[:, 3:] + self.encoders)))
+
+    def follow_truly(self, segment: Segment) -> None:
+        """Go along a path that is given as it truly leads. Raises MotionFailed."""
+        super().follow(segment, None)
 
     def follow(self, segment: Segment, item: str | None) -> None:
         """Go along a segment's path as far as base and joints tell, then do its event. Raises MotionFailed."""
-        super().follow(replace(segment, path=self.true_path(segment.path)), item)
-
-    def true_path(self, believed: np.ndarray) -> np.ndarray:
-        """Return where a path of base and arm (N, 3 + J) truly leads. What drives ends in a stop with a new error."""
-        path = np.array(believed, float)
+        path = np.array(segment.path, float)
         rolled = np.linalg.norm(np.diff(path[:, :3], axis=0), axis=1)
         share = np.zeros(len(path))
         before, after = self.error, self.error
@@ -63,14 +66,14 @@ class ErringRobot(PhysicalRobot):
             after = stop_error(self._random)
             share = np.concatenate([[0.0], np.cumsum(rolled) / rolled.sum()])
         path[:, :3] -= before + share[:, None] * (after - before)
-        path[:, 3:] += self._encoders
+        path[:, 3:] += self.encoders
         self.error = after
-        return path
+        super().follow(replace(segment, path=path), item)
 
     def way_back(self) -> np.ndarray:
         """Return (N, 3 + J) rows, as believed, that go back to where the base came to rest."""
         rows = super().way_back()
-        return np.concatenate([rows[:, :3] + self.error, rows[:, 3:] - self._encoders], axis=1)
+        return np.concatenate([rows[:, :3] + self.error, rows[:, 3:] - self.encoders], axis=1)
 
     def map_from_true(self) -> np.ndarray:
         """Return the transform (4, 4) of localisation's error where the base stands."""

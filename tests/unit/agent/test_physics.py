@@ -88,7 +88,7 @@ def test_a_robot_whose_arm_is_in_the_way_turns_before_it_drives_off(body: Physic
     edge = TABLE.centre[1] - TABLE.size[1] / 2
     start = np.array([TABLE.centre[0], edge - 0.45, np.pi / 2])
     driving, robot = body._driving, body._robot
-    robot.driver.put_as_believed(Configuration(start, robot.arm, robot.description.opening))
+    robot.driver.put(Configuration(start, robot.arm + robot.driver.encoders, robot.description.opening))
     if not room_behind:  # it may not turn far: half a metre of the way round is taken
         away = driving._room_to_turn
         driving._room_to_turn = lambda base, turn: float(np.clip(away(base, turn), -0.5, 0.5))  # type: ignore[method-assign]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import atan2, pi
 
 import numpy as np
@@ -11,6 +10,7 @@ from scenewright.stages.agent.senses import Base, Felt, Sweep
 from scenewright.stages.agent.world.physics.robot_in_room import RobotInRoom
 from scenewright.stages.agent.world.physics.seen import Seen
 from scenewright.stages.kit.motion.failures import MotionFailed
+from scenewright.stages.kit.motion.robot_errors import stop_error
 from scenewright.stages.kit.motion.segments import Segment
 from scenewright.stages.kit.simulation.engine import engine
 from scenewright.stages.kit.simulation.robot import Configuration
@@ -35,8 +35,10 @@ class Driving:
     def drive(self, base: Base, toward: str) -> Felt:
         """Drive along the robot's own map; with empty hands it is moved and asked for contacts, not simulated."""
         goal = np.array([base.x, base.y, base.yaw])
+        error = stop_error(self._robot.random)
         turns_there = bool(toward) or self._seen.obstacles.at_ease(base.x, base.y)  # its head turns anywhere
         failed: MotionFailed | None = None
+        rows: list[np.ndarray] = []
         for number in range(TRIES):
             path = self._seen.obstacles.path(self._robot.base, (base.x, base.y))
             if path is None:
@@ -44,39 +46,42 @@ class Driving:
                 break
             if not np.allclose(self._robot.arm, self._robot.home):
                 self._robot.arm_to(self._robot.home)
-            points = [np.array([*point, 0.0]) for point in path[1:-1]]
+            points = [np.array([*point, 0.0]) - self._robot.driver.error for point in path[1:-1]]
             ease = [self._seen.obstacles.at_ease(*point) for point in path[1:-1]]
             turns = (ease, [False] * len(ease), [True] * len(ease))[number % 3]
-            start, before = self._robot.driver.believed().base, self._robot.true_base()
-            failed = self._roll_along(np.array([start, *_facing_on(start, points, [*turns, turns_there], goal)]))
-            stuck = failed is not None and np.abs(self._robot.true_base() - before).max() < STEP / 2
-            if stuck and self._touched is not None:
+            start = self._robot.true_base()
+            rows = _facing_on(start, points, [*turns, turns_there], goal - error)
+            failed = self._roll_along(start, rows)
+            if failed is None:
+                break
+            if self._touched is not None and np.abs(self._robot.true_base() - start).max() < STEP / 2:
                 self._turn_from(self._touched)  # it does not get away as it stands
-            self._robot.stop()
-            if failed is None or (not points and number):
-                break  # it is there, or there but for the turn
+            self._robot.believed = self._robot.true_base() + self._robot.driver.error
+            if not points and number:
+                break  # it is there but for the turn
+        self._robot.driver.error = error
+        self._robot.believed = (rows[-1] if failed is None else self._robot.true_base()) + error
+        self._robot.believed[2] = (self._robot.believed[2] + pi) % (2 * pi) - pi
         if toward:
             self._robot.log.done("drive", f"drive to {toward.rsplit('_', 1)[0]}", failed is None, "navigation", "")
         return Felt(True) if failed is None else Felt(False, "no_way", failed.failure)
 
-    def _roll_along(self, bases: np.ndarray) -> MotionFailed | None:
-        """Drive along base poses (N, 3) of the map, from where it stands; return what ended it."""
-        rows = np.concatenate([bases, np.tile(self._robot.arm, (len(bases), 1))], axis=1)
+    def _roll_along(self, start: np.ndarray, rows: list[np.ndarray]) -> MotionFailed | None:
+        arm = self._robot.arm + self._robot.driver.encoders
         if self._robot.hold is not None:
-            start = self._robot.true_base()
+            rows_from_start = np.array([start, *rows])
             try:
-                self._robot.driver.follow(Segment(rows, 0.0), None)
+                self._robot.driver.follow_truly(Segment(_whole_body_rows(rows_from_start, arm), 0.0))
             except MotionFailed as failed:
                 if failed.failure.kind == "path_blocked":
                     self._robot.metres += float(np.linalg.norm((self._robot.true_base() - start)[:2]))
                     return failed
-            self._robot.metres += float(np.linalg.norm(np.diff(bases[:, :2], axis=0), axis=1).sum())
+            self._robot.metres += float(np.linalg.norm(np.diff(rows_from_start[:, :2], axis=0), axis=1).sum())
             return None
+        reached = start
         opening = self._robot.driver.robot.configuration().opening
         before = self._touching_depths()  # what it leans on already does not keep it from going away
-        true_rows = self._robot.driver.true_path(rows)
-        reached, arm = true_rows[0, :3], true_rows[0, 3:]
-        for row in true_rows[1:, :3]:
+        for row in rows:
             count = max(1, int(np.ceil(np.abs(row - reached)[:2].max() / STEP)))
             for k in range(1, count + 1):
                 at = reached + (row - reached) * k / count
@@ -126,18 +131,18 @@ class Driving:
     def _turn_from(self, touched: np.ndarray) -> None:
         """Turn on the spot until the folded arm points away from what was touched (2,), or as far as that goes, to the
         side that has more room."""
-        now = self._robot.driver.robot.configuration()
-        start = now.base
+        start = self._robot.true_base()
         away = atan2(start[1] - touched[1], start[0] - touched[0])
         short = (away - start[2] + pi) % (2 * pi) - pi
         turns = [self._room_to_turn(start, turn) for turn in (short, short - np.copysign(2 * pi, short))]
         base = start + (0.0, 0.0, min(turns, key=lambda turn: abs((turn - short + pi) % (2 * pi) - pi)))
-        self._robot.driver.put(replace(now, base=base))
+        arm, opening = self._robot.arm + self._robot.driver.encoders, self._robot.driver.robot.configuration().opening
+        self._robot.driver.put(Configuration(base, arm, opening))
         self._robot.seconds_aside += 1.0
 
     def _room_to_turn(self, start: np.ndarray, turn: float) -> float:
         """Return how far a base (3,) turns on the spot, at most by an angle [rad], before it touches something."""
-        arm = self._robot.driver.robot.configuration().arm
+        arm = self._robot.arm + self._robot.driver.encoders
         self._robot.driver.robot.set_body(np.concatenate([start, arm]))
         before, free = self._touching_depths(), 0.0
         for yaw in np.linspace(0.0, turn, int(abs(turn) / TURN_STEP) + 2)[1:]:
@@ -158,6 +163,11 @@ class Driving:
             if name is not None and world.bodies[name].record.class_name != "floor" and contact.depth > TOUCHES:
                 depths[name] = max(contact.depth, depths.get(name, 0.0))
         return depths
+
+
+def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    """Return (N, 3 + J) rows of base poses (N, 3) with one arm (J,)."""
+    return np.concatenate([bases, np.tile(arm, (len(bases), 1))], axis=1)
 
 
 def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:

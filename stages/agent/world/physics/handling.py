@@ -225,7 +225,7 @@ class Handling:
         return sum(c.force for c in contacts if c.other_body != self._robot.driver.robot.body_id) > 1.0
 
     def _nearest_thing(self, at: Position) -> str:
-        true = apply(inverse(self._robot.driver.map_from_true()), np.array([at], float))[0]
+        true = apply(inverse(self._robot.map_from_true()), np.array([at], float))[0]
         by_distance = [
             (hypot(x - true[0], y - true[1]), name)
             for name in self._loose()

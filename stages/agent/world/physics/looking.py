@@ -52,7 +52,7 @@ class Looking:
 
     def sweep(self) -> Sweep:
         """Turn the head camera around: floor, obstacles, large furniture."""
-        true, map_from_true = self._robot.true_base(), self._robot.driver.map_from_true()
+        true, map_from_true = self._robot.true_base(), self._robot.map_from_true()
         eye = np.array([true[0], true[1], head.HEIGHT])
         renderer = self._robot.room.renderer(eye)
         clouds = []
@@ -192,7 +192,7 @@ class Looking:
         """Return a camera pose, with the crop of a near look turned to the position that it is of."""
         if not close:
             return pose
-        shift = self._robot.driver.map_from_true()
+        shift = self._robot.map_from_true()
         target = np.array(at)
         if np.allclose(pose, self._robot.wrist_poses()[0]):
             target = apply(inverse(shift), target[None])[0]

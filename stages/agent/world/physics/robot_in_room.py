@@ -1,12 +1,13 @@
 """The robot itself: where it is and where it believes to be, its arm by its encoders, what moves it, its clock.
 
-Motions and beliefs are of the map's frame, which is where localisation says that things are (`ErringRobot`).
+Two frames: the true one, in which pybullet lives, and the map's, which is where localisation says that things are
+(`ErringRobot`).
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, pi, sin
+from math import cos, sin
 
 import numpy as np
 from scenewright.schemas.errors import UsageError
@@ -73,7 +74,7 @@ class RobotInRoom:
         self.arm = self.description.carry
         start = Configuration(self.believed, self.arm, self.description.opening)
         self.driver = ErringRobot(room.world, self.description, start, 1.0, self.random)
-        self.driver.put_as_believed(start)
+        self.driver.put_arm(self.arm, start.opening)
         self.hold: Hold | None = None
         """What it believes to hold."""
         self.carried: str | None = None
@@ -96,14 +97,13 @@ class RobotInRoom:
         """Since the beginning."""
         return self.seconds_aside + self.room.world.time
 
-    def stop(self) -> None:
-        """Take over where localisation says that it stands, after a drive."""
-        self.believed = self.driver.believed().base
-        self.believed[2] = (self.believed[2] + pi) % (2 * pi) - pi
-
     def true_base(self) -> np.ndarray:
         """Return where it stands (3,), true frame."""
         return self.driver.robot.configuration().base
+
+    def map_from_true(self) -> np.ndarray:
+        """Return the transform (4, 4) of localisation's error."""
+        return base_pose(self.believed, self.description) @ inverse(base_pose(self.true_base(), self.description))
 
     @property
     def home(self) -> np.ndarray:
@@ -112,41 +112,42 @@ class RobotInRoom:
 
     def arm_to(self, arm: np.ndarray) -> None:
         """Bring the arm to joint values; with empty hands it is put there."""
-        now = self.driver.believed()
         self.seconds_aside += LOOK_SECONDS
         if self.hold is None:
-            self.driver.put_as_believed(replace(now, arm=arm))
+            self.driver.put_arm(arm, self.driver.robot.configuration().opening)
         else:
             try:
-                self.carefully(Segment(whole_body(now.base, np.array([self.arm, arm])), 0.0, 0.6))
+                self._carefully(
+                    Segment(whole_body(self.believed, np.array([self.arm, arm])), 0.0, 0.6), self.true_base()
+                )
             except MotionFailed:
-                arm = self.driver.believed().arm  # something is in the way: it looks from where it got to
+                arm = self.driver.measured_arm()  # something is in the way: it looks from where it got to
         self.arm = arm
 
     def draw_in(self) -> None:
         """Draw the arm in after a motion that could not be planned or was stopped, with what it holds."""
         if self.hold is not None:
-            self.arm = self.driver.believed().arm
+            self.arm = self.driver.measured_arm()
             self.arm_to(self.home)
             return
         self.arm = self.description.carry
-        self.driver.put_as_believed(Configuration(self.driver.believed().base, self.arm, self.description.opening))
+        self.driver.put_arm(self.arm, self.description.opening)
 
-    def carefully(self, segment: Segment) -> None:
-        """Follow a segment; what slips out of the hand is not noticed. Raises MotionFailed `path_blocked`."""
+    def _carefully(self, segment: Segment, base: np.ndarray) -> None:
+        """Move the arm along a segment; what slips out of the hand is not noticed. Raises MotionFailed
+        `path_blocked`."""
         try:
-            self.driver.follow(segment, None)
+            self.driver.move_arm(segment, base)
         except MotionFailed as failed:
             if failed.failure.kind != "grasp_lost":
                 raise
 
     def carry_out(self, segments: tuple[Segment, ...]) -> None:
         """Follow planned motions of the arm where the base stands. Raises MotionFailed `path_blocked`."""
-        base = self.driver.believed().base
+        base = self.true_base()
         for segment in segments:
-            arms = segment.path[:, 3:]
-            self.carefully(replace(segment, path=whole_body(base, arms), event=""))
-            self.arm = arms[-1]
+            self._carefully(replace(segment, event=""), base)
+            self.arm = segment.path[-1, 3:]
 
     def in_hand(self, points: np.ndarray) -> np.ndarray:
         """Return (N,) bool: points (N, 3) of the map that are of what it believes to hold, or next to it."""
