@@ -151,7 +151,7 @@ def arrange(
             elif link is not None:
                 relations[name] = link
             continue
-        others = [solid for other, solid in solids.items() if other not in carried]
+        others = [solid for other, solid in solids.items() if other not in carried | waiting]
         placed = placer.place(chosen[name], seat, others)
         solids[name] = placed.solid
         placements[name] = placed.placement
@@ -194,4 +194,4 @@ def _in_order(graph: ContactGraphFile, chosen: Mapping[str, Placement]) -> list[
         return math.inf if box is None else float(np.prod(box.size))
 
     rank = {name: k for k, name in enumerate(order)}
-    return sorted(order, key=lambda name: (level[name], name in chosen, -volume(name), rank[name]))
+    return sorted(order, key=lambda name: (level[name], -volume(name), rank[name]))

@@ -53,8 +53,8 @@ class Room:
     """What else stands there, but for what carries the thing."""
     turn: np.ndarray
     """(3, 3): world from the frame of the thing."""
-    seen: np.ndarray
-    """(V, 3) what was seen of the thing, where it was seen, world frame [m]."""
+    seen: cKDTree
+    """Of what was seen of the thing, where it was seen, world frame [m]."""
     went: np.ndarray
     """(3,) how far the thing went from there [m]: what was empty around it goes along."""
     known: dict[tuple[tuple[float, float], float, float], bool] = field(default_factory=dict)
@@ -114,7 +114,7 @@ def completion_of(
     low, high = points.min(axis=0) - DEEPEST, points.max(axis=0) + DEEPEST
     low[2] = min(low[2], rests_at)
     near = tuple(piece for piece in others if (piece.low < high).all() and (piece.high > low).all())
-    room = Room(free_space, near, transform_from_yaw(yaw, np.zeros(3))[:3, :3], points - went, went)
+    room = Room(free_space, near, transform_from_yaw(yaw, np.zeros(3))[:3, :3], cKDTree(points - went), went)
     own = points @ room.turn
     seen = [piece @ room.turn for piece in pieces]
     if stands_steadily(seen, rests_at):

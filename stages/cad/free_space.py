@@ -69,17 +69,17 @@ class FreeSpace:
         """
         return self.near.at(points).astype(float)
 
-    def is_empty(self, points: np.ndarray, own: np.ndarray | None = None) -> np.ndarray:
+    def is_empty(self, points: np.ndarray, own: cKDTree | None = None) -> np.ndarray:
         """Return (N,) bool: points (N, 3), world, that were seen to lie in nothing.
 
         Rays that pass beside a thing go through cells that it reaches into. So cells count where those around a point,
-        as far as half an edge, were seen through too, and none that is within an edge of `own` (M, 3), what was seen
+        as far as half an edge, were seen through too, and none that is within an edge of `own`, points of what was seen
         of the thing that is asked for.
         """
         corners = 0.5 * self.far.edge * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         around = np.logical_and.reduce([self.far.at(points + corner) > 0 for corner in corners])
         if own is not None and around.any():
-            distance, _ = cKDTree(own).query(points[around], distance_upper_bound=self.far.edge)
+            distance, _ = own.query(points[around], distance_upper_bound=self.far.edge)
             around[around] = ~np.isfinite(distance)
         return (self.depth_within(points) > BEFORE_SURFACE) | around
 

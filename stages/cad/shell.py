@@ -238,7 +238,7 @@ def _pierced(panel: Panel, plane: LayoutPlane, panes: Sequence[Pane], seen: np.n
     solid, middles = panel.solid.copy(), panel.middles()
     shape = solid.shape
     local = apply(inverse(panel.frame), seen)
-    own = seen[np.abs(local[:, 2]) < OWN]
+    own = cKDTree(seen[np.abs(local[:, 2]) < OWN])
     for share in DEPTHS:
         solid &= ~free_space.is_empty(panel.at(share * panel.thickness), own).reshape(shape)
     start, end = (apply(inverse(panel.frame), np.array([corner]))[0] for corner in (plane.start, plane.end))

@@ -17,6 +17,7 @@ from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.formats.mobility import BUILT_IN, STANDS
 from scenewright.stages.kit.geometry.boxes import bottom, points_in_box
 from scenewright.stages.kit.geometry.steadiness import stands_steadily
+from scipy.spatial import cKDTree
 
 FAMILIES: Mapping[str, tuple[tuple[str, ...], Callable[[Reading], Form | str]]] = {
     "chair": (("chair",), chairs.read),
@@ -53,7 +54,9 @@ def surface_to_read(around: Surroundings, mesh: EntityMesh) -> Reading:
     links = [link for link in around.graph.links if link.source == around.node.id and link.relation in STANDS]
     boxes = [around.graph.node(link.target).box for link in links]
     carrying = tuple(bottom(child) for child in boxes if child is not None)
-    return Reading(patches, support_height_of(around.node), np.eye(3), around.free_space, mesh.vertices, carrying)
+    return Reading(
+        patches, support_height_of(around.node), np.eye(3), around.free_space, cKDTree(mesh.vertices), carrying
+    )
 
 
 def fit(family: str, reading: Reading, within: float = NEAR) -> Fitted | str:

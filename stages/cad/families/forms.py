@@ -12,6 +12,7 @@ from scenewright.stages.cad.completion import inside_points
 from scenewright.stages.cad.explained import distances
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.kit.geometry.solids import Solid, hull_or_box
+from scipy.spatial import cKDTree
 
 MOST_FILLED = 0.2
 """Share of a piece that was seen that may lie in space seen to be empty, as posts are some voxels wide; of
@@ -19,6 +20,8 @@ what is inferred, none."""
 SEEN_THROUGH, ASIDE, APRON = 0.1, 0.05, 0.1
 """Below a top, this share of the room was seen empty, so far from its edges and from top and ground [m]: what nobody
 saw through may be a box."""
+UNSURE = 0.02
+"""Where space that was seen empty ends is known to this [m]: a voxel of a map."""
 INFERRED_WORDS = "; inferred: "
 """Between what was seen of a form and what was not, in words."""
 SPACING, COARSE = 0.02, 0.05
@@ -85,8 +88,8 @@ class Reading:
     turn: np.ndarray
     """(3, 3): world from the frame of the thing."""
     free_space: FreeSpace
-    own: np.ndarray
-    """(V, 3) vertices of the thing, world [m]."""
+    own: cKDTree
+    """Of the vertices of the thing, world [m]."""
     carrying: tuple[float, ...] = ()
     """Heights at which things stand on it or in it [m]."""
 
@@ -115,9 +118,13 @@ class Reading:
         )
 
     def has_room(self, piece: Piece) -> bool:
-        """Whether a piece does not lie in space that was seen empty."""
-        share = self.filled(piece.corners)
-        return share <= MOST_FILLED if piece.seen else share == 0.0
+        """Whether a piece does not lie in space that was seen empty; of one that nobody saw, all that is farther inside
+        than where space ends is known."""
+        if piece.seen:
+            return self.filled(piece.corners) <= MOST_FILLED
+        middle, half = piece.corners.mean(axis=0), 0.5 * np.ptp(piece.corners, axis=0)
+        inside = np.maximum(half - UNSURE, 1e-4) / np.maximum(half, 1e-4)
+        return self.filled(middle + inside * (piece.corners - middle)) == 0.0
 
 
 def box_piece(name: str, low: np.ndarray, high: np.ndarray, *, seen: bool = True, carries: bool = False) -> Piece:

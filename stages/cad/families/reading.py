@@ -6,6 +6,10 @@ surface around them. What was not seen of a post's partners is mirrored about th
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
+from itertools import product
+
 import numpy as np
 from scenewright.stages.cad.carcasses import ACROSS, Patches, flat_places, own_yaw
 from scenewright.stages.cad.families.forms import APRON, Piece, Reading, box_piece
@@ -42,6 +46,8 @@ STICKS_OUT = 0.15
 """What sticks out farther [m] is of something else: masks leak."""
 OUTER = 0.01
 """Share of the surface that may lie beyond either end of a piece."""
+INSET = 0.25
+"""A leg that nobody saw is no farther from its corner than this share of half the board; by eye."""
 CORNER = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 EVERYWHERE = np.ones((3, 3), dtype=bool)
 
@@ -149,23 +155,45 @@ def posts_below(board: Piece, reading: Reading, name: str = "leg") -> list[Piece
             corners = post.corners.copy()
             corners[:, :2] = middle + mirror * (corners[:, :2] - middle)
             partner = Piece(name, corners, False)
-            if not any(_overlap(partner, other) for other in posts) and reading.has_room(partner):
-                posts.append(partner)
+            if not any(_overlap(partner, other) for other in posts):
+                posts += next(([piece] for piece in (partner, *_thinner(partner)) if reading.has_room(piece)), [])
     return posts
 
 
-def corner_legs(board: Piece, reading: Reading, width: float) -> list[Piece]:
-    """Return inferred legs of a width [m] at the corners of a board, where there is room."""
+def _thinner(post: Piece) -> Iterator[Piece]:
+    """Yield thinner posts in a post that stands or leans: of the least width along one side, then along both; in its
+    middle, then at its edges. What was seen of a post is wider than it is, by voxels and by what depth spreads."""
+    ends = post.corners.reshape(2, 4, 3)[..., :2]
+    widths = np.ptp(ends, axis=1)[:, None]
+    for along in ([True, False], [False, True], [True, True]):
+        least = np.where(along, np.minimum(widths, LEAST_POST), widths)
+        for side in (np.zeros(2), *CORNER):
+            corners = post.corners.copy()
+            middles = ends.mean(axis=1, keepdims=True) + 0.5 * side * (widths - least)
+            corners[:, :2] = (middles + 0.5 * least * CORNER).reshape(8, 2)
+            yield Piece(post.name, corners, post.seen)
+
+
+def corner_legs(board: Piece, reading: Reading, width: float, beside: Sequence[Piece] = ()) -> list[Piece]:
+    """Return inferred legs of a width [m], a corner of a board each: as far out as there is room, and none beside what
+    stands there already."""
     low, high = board.corners.min(axis=0), board.corners.max(axis=0)
     middle, half = 0.5 * (low + high)[:2], 0.5 * (high - low)[:2]
     if board.level is not None and len(board.corners) > 8:  # of what is round, within its outline
         half = 0.5 * (board.level[1] - board.level[0])[:2]
-    legs = []
+    steps = [np.arange(0.0, max(INSET * side, 1e-9), width) for side in half]
+    insets = sorted(product(*steps), key=lambda inset: (math.hypot(*inset), inset))
+    legs: list[Piece] = []
     for corner in CORNER:
-        place = middle + corner * (half - 0.5 * width)
-        edges = np.array([*(place - 0.5 * width), reading.base]), np.array([*(place + 0.5 * width), low[2]])
-        leg = box_piece("leg", *edges, seen=False)
-        legs += [leg] if reading.has_room(leg) else []
+        for inset in insets:
+            place = middle + corner * (half - 0.5 * width - inset)
+            edges = np.array([*(place - 0.5 * width), reading.base]), np.array([*(place + 0.5 * width), low[2]])
+            leg = box_piece("leg", *edges, seen=False)
+            if any(_overlap(leg, other) for other in beside):
+                break
+            if reading.has_room(leg):
+                legs.append(leg)
+                break
     return legs
 
 

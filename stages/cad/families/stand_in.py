@@ -16,7 +16,7 @@ from scenewright.schemas.base import as_vector
 from scenewright.schemas.cad_library import CadModel, ModelState
 from scenewright.schemas.cad_scene import Inferred
 from scenewright.schemas.contact_graph import GraphNode
-from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
+from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.explained import NEAR
 from scenewright.stages.cad.families.fitting import FAMILIES, Fitted, explains_clearly_more, fit, share, surface_to_read
@@ -59,7 +59,7 @@ def of_family(
     node = entry.node
     unknown = may_rename and not entry.placements
     own = [name for name, (classes, _) in FAMILIES.items() if node.class_name in classes]
-    tried = list(FAMILIES) if unknown and (node.class_name == UNNAMED or own) else own
+    tried = list(FAMILIES) if unknown else own
     if not tried or node.box is None:
         return "nothing of its class is of a family"
     if target.around.hangs:

@@ -35,7 +35,9 @@ def read(reading: Reading) -> Form | str:
     top = board_at("top", height, patches)
     if top is None:
         return "its top has no outline"
-    legs = posts_below(top, own) or corner_legs(top, own, LEG)
+    legs = posts_below(top, own)
+    if not stands_steadily([top.corners, *(leg.corners for leg in legs)], own.base):
+        legs += corner_legs(top, own, LEG, legs)
     if not legs:
         return "nothing carries its top"
     if not own.seen_through(top):

@@ -38,6 +38,7 @@ from scenewright.stages.engine.batch.quantities import format_bytes, format_seco
 from scenewright.stages.engine.batch.results import SceneResult
 from scenewright.stages.engine.batch.scene_log import LOG_NAME, LogFollower, clean
 from scenewright.stages.engine.batch.storage import drop_local, send
+from scenewright.stages.engine.estimation import free_bytes
 from scenewright.stages.engine.forking import Process
 from scenewright.stages.engine.own_code import own_code
 
@@ -198,6 +199,9 @@ def _describe(job: Job, watched: _Watched, follower: LogFollower) -> tuple[Outco
         if number == signal.SIGKILL:
             text += " (the kernel does that when memory runs out)"
         return outcome, code, text
+    if follower.error is None and outcome == "machine failure":  # which says why, where its log has room
+        free = format_bytes(free_bytes(Path(job.folder)))
+        return outcome, code, f"its log ends before the reason, {free} are free at {job.folder}: the disk was full"
     return outcome, code, follower.error or follower.last_line or f"exit code {code} and not a word"
 
 

@@ -2,9 +2,9 @@
 
     python scene_program.py FOLDER LOG SEED
 
-The log file holds one word and perhaps a number: `write`, `sleep 5`, `exit 3`, `outcome`, `signal 11`, `allocate 200`
-(MiB), `stubborn 30` (does not heed SIGTERM), `family 30` (a child that outlives its parent), `noise`, `fail-once`,
-`loaded` (writes whether a library was there before it was asked for).
+The log file holds one word and perhaps a number: `write`, `sleep 5`, `exit 3`, `unsaid 6` (exits without a reason),
+`outcome`, `signal 11`, `allocate 200` (MiB), `stubborn 30` (does not heed SIGTERM), `family 30` (a child that outlives
+its parent), `noise`, `fail-once`, `loaded` (writes whether a library was there before it was asked for).
 """
 
 import hashlib
@@ -47,6 +47,8 @@ def main() -> None:
         time.sleep(float(number))
     elif word == "exit":
         print("error: ingest: room 7: 3 of 120 frames", file=sys.stderr)
+        sys.exit(int(number))
+    elif word == "unsaid":
         sys.exit(int(number))
     elif word == "outcome":
         write_artifact(folder / "sequence", "nothing", "empty")

@@ -81,6 +81,12 @@ def test_failures_are_told_apart(
     assert found.outcomes == ({"sequence": "empty"} if outcome == "not ok" else {})
 
 
+def test_a_disk_too_full_for_the_reason_is_the_reason(run: Run, tmp_path: Path) -> None:
+    found = run(scene(tmp_path, "unsaid 6"))
+    assert found is not None and found.outcome == "machine failure"
+    assert found.reason.startswith("its log ends before the reason") and f"free at {tmp_path / 'run'}" in found.reason
+
+
 def test_an_artifact_of_an_earlier_run_is_not_counted_for_a_failed_step(run: Run, tmp_path: Path) -> None:
     assert run(scene(tmp_path, "write"))
     found = run(scene(tmp_path, "exit 3"))

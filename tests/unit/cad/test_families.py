@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from scenewright.stages.cad.families.stand_in import class_of, inferred_of, like
 from scenewright.stages.kit.formats.cad_models import read_model
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
+from scipy.spatial import cKDTree
 
 from tests.panoptic_maps import floor_mesh, placed, seen_surface
 from tests.unit.cad import models
@@ -47,7 +49,7 @@ def reading_of(boxes, *, yaw=0.3, unseen=(), hidden=(), noise=0.002, at=(0.2, -0
     shown = trimesh.util.concatenate([mesh for k, mesh in enumerate(whole) if k not in unseen])
     mesh = seen_surface({1: shown}, EYES, noise=noise)[1]
     entity = EntityMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((len(mesh.vertices), 3), np.uint8))
-    return Reading(patches_of(entity), 0.0, np.eye(3), Known(boxes, pose, hidden), entity.vertices)
+    return Reading(patches_of(entity), 0.0, np.eye(3), Known(boxes, pose, hidden), cKDTree(entity.vertices))
 
 
 def legs(x, y, z, width=0.05, inset=0.0):
@@ -83,6 +85,11 @@ def fitted(family, reading) -> Form:
 
 def extents(*pieces: Piece) -> np.ndarray:
     return np.ptp(np.concatenate([piece.corners for piece in pieces]), axis=0)
+
+
+def off_middle(piece: Piece, form: Form) -> np.ndarray:
+    (top,) = named(form, "top")
+    return (piece.corners.mean(axis=0) - 0.5 * (top.corners.min(axis=0) + top.corners.max(axis=0)))[:2]
 
 
 def named(form: Form, name: str) -> list[Piece]:
@@ -127,6 +134,28 @@ def test_a_leg_that_nobody_saw_is_where_its_partner_says_or_nowhere(tmp_path):
     empty = reading_of(boxes, unseen=(4,))
     empty = Reading(empty.patches, 0.0, empty.turn, Known(boxes[:4], empty.free_space.pose), empty.own)
     assert len(named(fitted("table", empty), "leg")) == 3, "not where cameras saw that nothing is"
+
+
+def test_legs_that_nobody_saw_are_as_far_out_as_there_is_room():
+    boxes = table(1.4, 0.8, 0.75)
+    room = [((x - 0.03, y - 0.03, 0.0), (x + 0.03, y + 0.03, 0.72)) for x in (-0.6, 0.6) for y in (-0.3, 0.3)]
+    reading = reading_of(boxes, unseen=(1, 2, 3, 4), hidden=room)
+    reading = replace(reading, free_space=Known(boxes[:1], reading.free_space.pose, room))
+    form = fitted("table", reading)
+    found = named(form, "leg")
+    assert len(found) == 4 and not any(leg.seen for leg in found)
+    assert np.abs([off_middle(leg, form) for leg in found]) == pytest.approx(np.tile([0.6, 0.3], (4, 1)), abs=0.03)
+
+
+def test_a_partner_is_as_thin_as_its_room():
+    boxes = [((-0.7, -0.4, 0.72), (0.7, 0.4, 0.75)), *legs(1.4, 0.8, 0.72, 0.12)]
+    room = [((0.62, 0.28, 0.0), (0.7, 0.33, 0.72))]
+    reading = reading_of(boxes, unseen=(4,), hidden=room)
+    reading = replace(reading, free_space=Known(boxes[:4], reading.free_space.pose, room))
+    form = fitted("table", reading)
+    (partner,) = (leg for leg in named(form, "leg") if not leg.seen)
+    assert extents(partner)[:2].min() == pytest.approx(0.03, abs=0.005)
+    assert np.abs(off_middle(partner, form)) == pytest.approx([0.64, 0.34], abs=0.06)
 
 
 def test_a_chair_has_a_seat_a_back_and_legs():
