@@ -69,9 +69,9 @@ class Driving:
     def _roll_along(self, start: np.ndarray, rows: list[np.ndarray]) -> MotionFailed | None:
         arm = self._robot.arm + self._robot.driver.encoders
         if self._robot.hold is not None:
-            rows_from_start = np.array([start, *rows])
+            rows_from_start = np.array([[*base, *arm] for base in (start, *rows)])
             try:
-                self._robot.driver.follow_truly(Segment(_whole_body_rows(rows_from_start, arm), 0.0))
+                self._robot.driver.follow_truly(Segment(rows_from_start, 0.0))
             except MotionFailed as failed:
                 if failed.failure.kind == "path_blocked":
                     self._robot.metres += float(np.linalg.norm((self._robot.true_base() - start)[:2]))
@@ -163,11 +163,6 @@ class Driving:
             if name is not None and world.bodies[name].record.class_name != "floor" and contact.depth > TOUCHES:
                 depths[name] = max(contact.depth, depths.get(name, 0.0))
         return depths
-
-
-def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Return (N, 3 + J) rows of base poses (N, 3) with one arm (J,)."""
-    return np.concatenate([bases, np.tile(arm, (len(bases), 1))], axis=1)
 
 
 def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:

@@ -217,7 +217,7 @@ def _taken_along(
         map_from_tool[:3, :3],
         beliefs.description.carry,
     )
-    beliefs.world.set_pose(target.name, _far())
+    beliefs.world.set_pose(target.name, raised(np.eye(4), -5.0))  # out of the way
     in_hand = planner.under(beliefs.hold(hold))
     home = in_hand.folding(base, lift[-1], Tally())
     if home is None:
@@ -268,9 +268,3 @@ def _by_another_elbow(
         if solution.found and planner.free(base, solution.arm, tally):
             return solution.arm
     return None
-
-
-def _far() -> np.ndarray:
-    pose = np.eye(4)
-    pose[2, 3] = -5.0
-    return pose
