@@ -1,7 +1,8 @@
 """Tasks of the board by `plan` where the map is right: the true room is the planned scene, and where it is carried out.
 
 What fails here, no mapping mends. Rooms are of the board's generator and recipe, tasks are drawn and judged as the
-board draws and judges them. A seed is a room; `true`: the robot is told how things stand, `camera`: it looks.
+board draws and judges them. A seed is a room; `true`: the robot is told how things stand, `camera`: it looks. Other
+arms are told.
 """
 
 from __future__ import annotations
@@ -18,10 +19,17 @@ from scenewright.stages.kit.stage import Parameters
 from benchmarks.board.inputs import RUNGS, Generator
 from benchmarks.board.tasks.drawing import KINDS
 from benchmarks.board.tasks.measuring import RECIPE, RUNG
-from benchmarks.board.tasks.running import EYES, TaskRecord, TaskRoom, run_true_room
-from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Trial
+from benchmarks.board.tasks.running import TaskRecord, TaskRoom, run_true_room
+from benchmarks.experiment import Bench, Experiment, Measure, Pooled, Results, Share, Trial
 
 TASKS = "tasks"
+ARMS = {
+    "true": ("true", "panda", "told how things stand"),
+    "camera": ("camera", "panda", "by its own eyes"),
+    "ur5e": ("true", "ur5e", "told, with a UR5e"),
+    "xarm7": ("true", "xarm7", "told, with an xArm 7"),
+}
+"""Arm of the experiment -> eyes, robot, in words."""
 TUNING = tuple(f"{RECIPE}-{seed}" for seed in (9001, 9002, 9003, *range(5101, 5115), 6201))
 """Rooms whose failures were looked at while the planner was mended."""
 REPORTING = tuple(f"{RECIPE}-{seed}" for seed in range(6202, 6223))
@@ -55,8 +63,9 @@ def prepare(bench: Bench, trials: Sequence[Trial]) -> None:
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, RoomTasks]]:
     """Yield what came of the tasks of rooms."""
     for trial in trials:
+        eyes, robot, _ = ARMS[trial.arm]
         room = TaskRoom(trial.seed, truth_of(bench, trial.seed), int(trial.seed.rsplit("-", 1)[1]))
-        yield trial, RoomTasks(tuple(run_true_room(room, bench.folder(trial), trial.arm)))
+        yield trial, RoomTasks(tuple(run_true_room(room, bench.folder(trial), eyes, robot)))
 
 
 def of_kind(kind: str, record: RoomTasks) -> RoomTasks | None:
@@ -67,7 +76,7 @@ def of_kind(kind: str, record: RoomTasks) -> RoomTasks | None:
 
 def share(of: Callable[[TaskRecord], bool]) -> Measure:
     """Return the share of tasks of which something holds, intervals over rooms."""
-    return Measure(Pooled(lambda record: (float(sum(map(of, record.tasks))), float(len(record.tasks)))))
+    return Measure(Share(lambda record: (float(sum(map(of, record.tasks))), float(len(record.tasks)))))
 
 
 def write_failures(results: Results) -> None:
@@ -90,8 +99,8 @@ EXPERIMENT = Experiment(
     title="Tasks of the board with a perfect map",
     simulated="Rooms, robot and physics.",
     knows="The true room: shapes, poses, joints, who stands on what. With the eyes `camera` it looks all the same.",
-    does_not_show="What a map's errors cost: the board does.",
-    arms={"true": "told how things stand", "camera": "by its own eyes"},
+    does_not_show="What a map's errors cost: the board does. Tasks are drawn for the hand of a Panda.",
+    arms={name: words for name, (*_, words) in ARMS.items()},
     cases=(TASKS,),
     tuning=TUNING,
     reporting=REPORTING,
@@ -110,8 +119,7 @@ EXPERIMENT = Experiment(
     inputs=lambda bench, trial: [truth_of(bench, trial.seed)],
     prepare=prepare,
     steps=("plan",),
-    pairs=(("camera", "true"),),
+    pairs=tuple((name, "true") for name in ARMS if name != "true"),
     compared=("success",),
     pictures=write_failures,
 )
-assert set(EXPERIMENT.arms) == set(EYES)

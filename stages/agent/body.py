@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from scenewright.stages.agent.obstacle_map import ObstacleMap
-from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep, Take
+from scenewright.stages.agent.senses import CANDIDATES, Base, Detection, Felt, Look, Position, Sweep, Take
 
 
 class Body(Protocol):
@@ -70,9 +70,9 @@ class Body(Protocol):
         """Whether what it holds, if anything, was taken by a level hand, so that it can go into a shelf."""
         ...
 
-    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False, most: int = CANDIDATES) -> Felt:
         """Close the hand at a position by the grasp of a rank (0 first), of a `level` hand alone where that is said.
-        `label`: what is believed to be there."""
+        `most`: grasps that are planned before it gives up. `label`: what is believed to be there."""
         ...
 
     def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:

@@ -15,6 +15,8 @@ from scenewright.schemas.plan import Failure
 Position = tuple[float, float, float]
 Take = Literal["", "any", "level"]
 """Whether something is to be taken, and whether a level hand has to, as for what goes into a shelf."""
+CANDIDATES = 40
+"""Grasps that are planned before a robot gives up, those from above first: eight of each of five pitches."""
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import narrowest_width
 from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.kit.motion.grasps import narrowest_width
 from scenewright.stages.kit.motion.kinematics import reach, shoulder_height
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 from scenewright.stages.kit.simulation.world import FRICTION, GRAVITY

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
+from scenewright.stages.kit.acting.erring_robot import ErringRobot
 from scenewright.stages.kit.acting.errors import quarter_turn
 from scenewright.stages.kit.acting.eyes.masks import Segmenter
 from scenewright.stages.kit.geometry.cameras import scaled
@@ -16,7 +17,6 @@ from scenewright.stages.kit.rendering.object_views import View, cloud, take
 from scenewright.stages.kit.simulation.shapes import link_shapes, surface_points
 from scenewright.stages.plan.affordances import CARRIER_CLASSES
 from scenewright.stages.plan.correspondence import alike
-from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Seen
 from scenewright.stages.plan.furniture_fit import FittedFurniture, Range, fit_furniture
 from scenewright.stages.plan.pictures import RoomPictures

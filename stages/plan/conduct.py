@@ -9,6 +9,7 @@ import numpy as np
 from scenewright.schemas.interactive_scene import SceneBody
 from scenewright.schemas.plan import BodyMatch, Failure
 from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.acting.erring_robot import ErringRobot
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -19,7 +20,6 @@ from scenewright.stages.kit.simulation.carriers import NOTHING, carrier
 from scenewright.stages.kit.simulation.robot import base_pose
 from scenewright.stages.plan.action import MotionRequest, action_named
 from scenewright.stages.plan.correspondence import match_joint
-from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Eyes, Room
 from scenewright.stages.plan.level_carrying import LEVEL_PACE, levelled
 from scenewright.stages.plan.pick_place import Budgets

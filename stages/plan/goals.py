@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import narrowest_width
 from scenewright.stages.kit.geometry.transforms import apply
-from scenewright.stages.kit.motion.grasps import narrowest_width
 from scenewright.stages.kit.tasks.strips import Atom, atom_text
 from scenewright.stages.plan.world_model import WorldModel
 

@@ -7,7 +7,9 @@ from typing import Literal
 
 import numpy as np
 from scenewright.stages.kit.acting.hand.attempts import first_motion
+from scenewright.stages.kit.acting.hand.grip import PITCHES, Grasp, narrowest_width
 from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
+from scenewright.stages.kit.acting.hand.sampled_grasps import sample_grasps
 from scenewright.stages.kit.acting.query import carrying, touching
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
@@ -15,7 +17,6 @@ from scenewright.stages.kit.motion.base_placement import free_bases, possible_ba
 from scenewright.stages.kit.motion.cartesian import drawn_back, raised
 from scenewright.stages.kit.motion.collision import RESTING_DEPTH
 from scenewright.stages.kit.motion.failures import MotionFailed
-from scenewright.stages.kit.motion.grasps import Grasp, narrowest_width, sample_grasps
 from scenewright.stages.kit.motion.segments import Manipulation, Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.plan.level_carrying import LEVEL_PACE, RAISE, drawn_in, level_place
@@ -46,13 +47,13 @@ PALM_ROOM = 0.006
 GraspStyle = Literal["any", "rather_level", "level", "steep"]
 """How the hand may come: `level` from the side (for what is put under a cover), `steep` from above (into a drawer);
 `rather_level` tries the ways from the side first."""
-PITCHES: dict[GraspStyle, tuple[float, ...]] = {
-    "any": (0.0, 0.35, 0.7, 1.1, np.pi / 2),
-    "rather_level": (0.0, 0.35, 0.7, 1.1, np.pi / 2),
-    "level": (0.0, 0.35, 0.7),
-    "steep": (1.1, np.pi / 2),
+STYLES: dict[GraspStyle, tuple[float, ...]] = {
+    "any": PITCHES,
+    "rather_level": PITCHES,
+    "level": PITCHES[:3],
+    "steep": PITCHES[3:],
 }
-"""How far the hand is tilted out of the level [rad], by how it may come; by eye."""
+"""How far the hand is tilted out of the level [rad], by how it may come."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def _two_finger_grasps(
 
     def sampled(friction: float) -> list[Grasp]:
         return sample_grasps(
-            points, normals, model.pose(item), opening=widest, random=random, pitches=PITCHES[style], friction=friction
+            points, normals, model.pose(item), opening=widest, random=random, pitches=STYLES[style], friction=friction
         )
 
     firm, loose = sampled(FRICTION_USED), sampled(np.inf)
@@ -218,7 +219,7 @@ def plan_pick(
     queue.sort(
         key=lambda entry: (
             not over[id(entry[1])],
-            sideways and entry[1].pitch > max(PITCHES["level"]),
+            sideways and entry[1].pitch > max(STYLES["level"]),
             twist.get(id(entry[1]), 0.0),
         )
     )

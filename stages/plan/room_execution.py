@@ -13,6 +13,7 @@ from scenewright.schemas.ground_truth import GroundTruth
 from scenewright.schemas.interactive_scene import InteractiveScene, SceneBody
 from scenewright.schemas.plan import BodyMatch, Check, Failure, TreeDifference, TriedPlan
 from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.kit.acting.erring_robot import ErringRobot
 from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors, segmenter_rates
 from scenewright.stages.kit.acting.eyes.masks import Segmenter
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -26,7 +27,6 @@ from scenewright.stages.plan.camera_eyes import CameraEyes
 from scenewright.stages.plan.check_margins import with_margins
 from scenewright.stages.plan.conduct import Conduct, joint_pairs
 from scenewright.stages.plan.correspondence import match_bodies
-from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.execution_log import write_execution
 from scenewright.stages.plan.eyes import Eyes, Room, TrueEyes
 from scenewright.stages.plan.goal_checks import check_goal
@@ -231,11 +231,9 @@ def execute(
 def _robot(
     world: PhysicsWorld, model: WorldModel, start: Configuration, parameters: PlanParameters, context: Context
 ) -> PhysicalRobot:
-    # A hand's fingers go together: with a motor each, what they hold is free to slide between them by centimetres.
-    description = replace(model.description, coupled_fingers=True)
     if parameters.eyes == "true":
-        return PhysicalRobot(world, description, start, RECORD_RATE)
-    return ErringRobot(world, description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
+        return PhysicalRobot(world, model.description, start, RECORD_RATE)
+    return ErringRobot(world, model.description, start, RECORD_RATE, context.random(ROBOT_ERRORS))
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import narrowest_width
 from scenewright.stages.kit.geometry.transforms import apply
 from scenewright.stages.kit.motion.failures import MotionFailed
-from scenewright.stages.kit.motion.grasps import narrowest_width
 from scenewright.stages.kit.tasks.strips import Atom, atom_text
 from scenewright.stages.plan.world_model import WorldModel
 

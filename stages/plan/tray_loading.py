@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import narrowest_width
 from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
-from scenewright.stages.kit.motion.grasps import narrowest_width
 
 if TYPE_CHECKING:
     from scenewright.stages.plan.world_model import WorldModel

@@ -107,12 +107,13 @@ def run_tasks(method: Method, room: TaskRoom, made: MadeScene | None, scratch: P
         yield _record(room, number, task, eyes, carried, found, has_scene=known is not None)
 
 
-def run_true_room(room: TaskRoom, scratch: Path, eyes: str) -> Iterator[TaskRecord]:
-    """Yield what came of each task of a room, by some eyes, where the planned scene is the true room: a perfect map.
-    Plans are written to folders of `scratch`, by this checkout. Raises BadInput for a truth that can't be read."""
+def run_true_room(room: TaskRoom, scratch: Path, eyes: str, robot: str) -> Iterator[TaskRecord]:
+    """Yield what came of each task of a room, by some eyes and a named robot, where the planned scene is the true room:
+    a perfect map. Plans are written to folders of `scratch`, by this checkout. Raises BadInput for a truth that can't
+    be read."""
     for number, task in enumerate(draw_tasks(facts_of(room.truth), room.seed)):
         carried = Carried(task.literals(), ())
-        found = _planned_truth(room, carried.literals, scratch / f"{number}_{eyes}", eyes)
+        found = _planned_truth(room, carried.literals, scratch / f"{number}_{eyes}", eyes, robot)
         yield _record(room, number, task, eyes, carried, found, has_scene=True)
 
 
@@ -149,11 +150,11 @@ def _planned(
     return _read_plan(out, seconds)
 
 
-def _planned_truth(room: TaskRoom, literals: tuple[str, ...], out: Path, eyes: str) -> _Found:
+def _planned_truth(room: TaskRoom, literals: tuple[str, ...], out: Path, eyes: str, robot: str) -> _Found:
     shutil.rmtree(out, ignore_errors=True)
     truth, start = opened(GroundTruth, room.truth), time.process_time()
     scene = InteractiveScene(truth.path("room"))
-    given = {"goal": literals, "eyes": eyes, "video_rate": 0, "image_width": 64}
+    given = {"goal": literals, "eyes": eyes, "robot": robot, "video_rate": 0, "image_width": 64}
     unrecorded("plan", out, given, seed=room.seed, scene=scene, ground_truth=truth)
     return _read_plan(out, round(time.process_time() - start, 2))
 

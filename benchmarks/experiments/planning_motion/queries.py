@@ -14,9 +14,9 @@ import numpy as np
 from scenewright.schemas.base import as_transform
 from scenewright.schemas.interactive_scene import SceneBody
 from scenewright.schemas.scene_parts import Box
+from scenewright.stages.kit.acting.hand.sampled_grasps import sample_grasps
 from scenewright.stages.kit.motion.base_placement import in_arm_frame, sample_bases
 from scenewright.stages.kit.motion.collision import CollisionChecker
-from scenewright.stages.kit.motion.grasps import sample_grasps
 from scenewright.stages.kit.motion.kinematics import arm_chain, inverse_kinematics, random_starts
 from scenewright.stages.kit.simulation.robot import Configuration, Robot
 from scenewright.stages.kit.simulation.robot_description import load_robot

@@ -8,6 +8,8 @@ from scenewright.stages.agent.language.values import ObjectMap, Observation, Out
 from scenewright.stages.agent.scene_map import Item, quarter
 from scenewright.stages.agent.senses import Position
 
+GRASPS = 20
+"""Candidates that are tried, those from above before others."""
 SHORT = 0.1
 """Sides whose middle is this much farther from the target than the nearest are no "short distance" [m]."""
 
@@ -62,7 +64,7 @@ class ThesisSkills(CommonSkills):
 
     def grasp(self, item: Item) -> Outcome:
         """Carry out the best grasp that can be planned."""
-        felt = self._body.grasp(item.position, item.label, 0)
+        felt = self._body.grasp(item.position, item.label, 0, most=GRASPS)
         if felt.ok:
             self.took(item)
         return Outcome(felt.ok)

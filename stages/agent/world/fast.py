@@ -158,7 +158,7 @@ class FastWorld:
         foreseen = self._luck.happens(self._rates.foreseen, "foreseen", *key)
         return not (foreseen and self._luck.happens(self._rates.base, "base", *key))
 
-    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False, most: int = 1) -> Felt:
         """Take what is nearest to a position. A slip and a wrong thing are not felt."""
         self._seconds += SECONDS["grasp"]
         body, piece = self._at(at), self._under(at)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.motion.failures import MotionFailed
@@ -31,7 +33,8 @@ class PhysicalRobot:
     ) -> None:
         self.world = world
         self.description = description
-        self.robot = Robot(world, description)
+        # a hand's fingers go together: with a motor each, what they hold slides between them by centimetres
+        self.robot = Robot(world, replace(description, coupled_fingers=True))
         self.robot.set(start)
         self.recording = Recording(world, self.robot, 1.0 / record_rate)
         self.action = -1

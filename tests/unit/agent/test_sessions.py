@@ -27,7 +27,7 @@ from scenewright.stages.agent.language.values import SceneObject
 from scenewright.stages.agent.parameters import EvaluateParameters, ReplayParameters, RunParameters, check_run
 from scenewright.stages.agent.replay_stage import run as replay
 from scenewright.stages.agent.run_stage import run as run_step
-from scenewright.stages.agent.senses import Detection
+from scenewright.stages.agent.senses import Detection, Felt, Position
 from scenewright.stages.agent.session import Limits, Session, run_session
 from scenewright.stages.agent.tasks import TASKS, make_apartment
 from scenewright.stages.agent.trials import Setting, goals_of, rules_brain, run_trial
@@ -60,6 +60,18 @@ def test_where_nothing_fails_the_tasks_are_done_and_the_impossible_is_said(name:
         made = score(TASKS[name].goals, TASKS[name].impossible, session, world)
         assert made.success, (arm, session.end, session.words)
         assert made.failures["grasp"] == (0, 0)
+
+
+def test_the_arms_of_the_thesis_try_its_twenty_grasps(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, grasp = [], FastWorld.grasp
+
+    def spy(world: FastWorld, at: Position, label: str, candidate: int, **how: int) -> Felt:
+        asked.append(how.get("most"))
+        return grasp(world, at, label, candidate, **how)
+
+    monkeypatch.setattr(FastWorld, "grasp", spy)
+    run_trial(setting("transfer_all_toys", 300), "thesis")
+    assert set(asked) == {20}
 
 
 def test_no_module_of_an_arm_or_brain_imports_the_world() -> None:

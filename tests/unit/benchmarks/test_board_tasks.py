@@ -269,7 +269,8 @@ def test_where_the_map_is_the_true_room_a_task_is_asked_for_as_it_is(
     asked: list[tuple[str, ...]] = []
 
     def planned(name, out, given, *, seed, scene, ground_truth):  # type: ignore[no-untyped-def]
-        assert (name, given["eyes"], scene.root, ground_truth.root) == ("plan", "true", truth / "room", truth)
+        assert (name, given["eyes"], given["robot"]) == ("plan", "true", "ur5e")
+        assert (scene.root, ground_truth.root) == (truth / "room", truth)
         asked.append(given["goal"])
         out.mkdir(parents=True)
         plan = PlanFile(goal=given["goal"], planned_in="reconstructed", executed_in=None, actions=(), status="planned")
@@ -278,7 +279,7 @@ def test_where_the_map_is_the_true_room_a_task_is_asked_for_as_it_is(
     monkeypatch.setattr(running, "facts_of", lambda path: facts_of(room))
     monkeypatch.setattr(running, "opened", lambda kind, path: kind(path))
     monkeypatch.setattr(running, "unrecorded", planned)
-    records = list(running.run_true_room(running.TaskRoom("room-7", truth, 7), tmp_path / "scratch", "true"))
+    records = list(running.run_true_room(running.TaskRoom("room-7", truth, 7), tmp_path / "scratch", "true", "ur5e"))
     assert [record.asked for record in records] == asked == [record.goal + record.keeps for record in records]
     assert {(record.status, record.success, record.failure) for record in records} == {
         ("planned", False, running.SOMETHING_ELSE)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 from scenewright.schemas.scene_parts import Joint
+from scenewright.stages.kit.acting.hand.grip import narrowest_width
+from scenewright.stages.kit.acting.hand.sampled_grasps import _square, sample_grasps
 from scenewright.stages.kit.motion.doors import (
     ContactPoint,
     body_from_moved,
@@ -13,7 +15,6 @@ from scenewright.stages.kit.motion.doors import (
     push_points,
     tool_poses,
 )
-from scenewright.stages.kit.motion.grasps import _square, narrowest_width, sample_grasps
 from scenewright.stages.kit.simulation.shapes import surface_points
 
 HINGE = Joint(

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scenewright.stages.kit.acting.erring_robot import ErringRobot
 from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors, SegmenterRates, segmenter_rates
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.motion.segments import Segment
@@ -16,7 +17,6 @@ from scenewright.stages.kit.simulation.robot import Configuration
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.world import load_scene, read_scene_bodies
 from scenewright.stages.plan.camera_eyes import CameraEyes
-from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Room
 from scenewright.stages.plan.pictures import RoomPictures
 from scenewright.stages.plan.pose_fit import fit_upright
@@ -61,7 +61,7 @@ def sight(scene: Path, kitchen_model: WorldModel) -> Iterator[SimpleNamespace]:
         robot = load_robot("panda")
         start = Configuration(np.array([-1.3, -0.2, -np.pi / 2]), robot.carry, robot.opening)
         erring = ErringRobot(world, robot, start, 1.0, np.random.default_rng(0))
-        erring._error = np.array([0.01, -0.02, 0.0])
+        erring.error = np.array([0.01, -0.02, 0.0])
         yield SimpleNamespace(model=kitchen_model, room=room, world=world, robot=erring)
     kitchen_model.restore(before)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
+from scenewright.stages.kit.acting.hand.sampled_grasps import sample_grasps
 from scenewright.stages.kit.geometry.transforms import apply, inverse
-from scenewright.stages.kit.motion.grasps import sample_grasps
 from scenewright.stages.kit.simulation.shapes import surface_points
 from scenewright.stages.plan.pick_place import HAND_END, PALM_BEHIND, _palm_free
 

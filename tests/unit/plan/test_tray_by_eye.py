@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scenewright.schemas.contact_graph import ContactGraphFile
+from scenewright.stages.kit.acting.erring_robot import ErringRobot
 from scenewright.stages.kit.acting.errors import Luck, SegmenterErrors, segmenter_rates
 from scenewright.stages.kit.geometry.transforms import apply, inverse, transform_from_yaw
 from scenewright.stages.kit.simulation.robot import Configuration
@@ -17,7 +18,6 @@ from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.world import load_scene, read_scene_bodies
 from scenewright.stages.plan.affordances import has_rim
 from scenewright.stages.plan.camera_eyes import CameraEyes, Look
-from scenewright.stages.plan.erring_robot import ErringRobot
 from scenewright.stages.plan.eyes import Room
 from scenewright.stages.plan.pictures import RoomPictures
 from scenewright.stages.plan.room_segmenter import room_segmenter

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenewright.schemas.errors import UsageError
+from scenewright.stages.kit.acting.erring_robot import ErringRobot
 from scenewright.stages.kit.simulation.robot import Configuration, Robot
 from scenewright.stages.kit.simulation.robot_description import load_robot
 from scenewright.stages.kit.simulation.world import load_scene
-from scenewright.stages.plan.erring_robot import ErringRobot
 
 from tests.unit.simulation.handmade_scene import bottle, floor, write_scene
 

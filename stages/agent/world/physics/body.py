@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from scenewright.schemas.apartment import Furniture
-from scenewright.stages.agent.senses import Base, Detection, Felt, Look, Position, Sweep, Take
+from scenewright.stages.agent.senses import CANDIDATES, Base, Detection, Felt, Look, Position, Sweep, Take
 from scenewright.stages.agent.world.events import Event
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.physics.driving import Driving
@@ -98,9 +98,9 @@ class PhysicsBody:
         """Whether what it holds was taken by a level hand."""
         return self._handling.held_level
 
-    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False, most: int = CANDIDATES) -> Felt:
         """Take what was seen at a position."""
-        return self._handling.grasp(at, label, candidate, level=level)
+        return self._handling.grasp(at, label, candidate, level=level, most=most)
 
     def release(self, at: Position, label: str, *, gently: bool = False) -> Felt:
         """Let go over a position."""

@@ -46,7 +46,7 @@ class Driving:
                 break
             if not np.allclose(self._robot.arm, self._robot.home):
                 self._robot.arm_to(self._robot.home)
-            points = [np.array([*point, 0.0]) - self._robot.error for point in path[1:-1]]
+            points = [np.array([*point, 0.0]) - self._robot.driver.error for point in path[1:-1]]
             ease = [self._seen.obstacles.at_ease(*point) for point in path[1:-1]]
             turns = (ease, [False] * len(ease), [True] * len(ease))[number % 3]
             start = self._robot.true_base()
@@ -56,10 +56,10 @@ class Driving:
                 break
             if self._touched is not None and np.abs(self._robot.true_base() - start).max() < STEP / 2:
                 self._turn_from(self._touched)  # it does not get away as it stands
-            self._robot.believed = self._robot.true_base() + self._robot.error
+            self._robot.believed = self._robot.true_base() + self._robot.driver.error
             if not points and number:
                 break  # it is there but for the turn
-        self._robot.error = error
+        self._robot.driver.error = error
         self._robot.believed = (rows[-1] if failed is None else self._robot.true_base()) + error
         self._robot.believed[2] = (self._robot.believed[2] + pi) % (2 * pi) - pi
         if toward:
@@ -67,11 +67,11 @@ class Driving:
         return Felt(True) if failed is None else Felt(False, "no_way", failed.failure)
 
     def _roll_along(self, start: np.ndarray, rows: list[np.ndarray]) -> MotionFailed | None:
-        arm = self._robot.arm + self._robot.joint_error
+        arm = self._robot.arm + self._robot.driver.encoders
         if self._robot.hold is not None:
-            rows_from_start = np.array([start, *rows])
+            rows_from_start = np.array([[*base, *arm] for base in (start, *rows)])
             try:
-                self._robot.driver.follow(Segment(_whole_body_rows(rows_from_start, arm), 0.0), None)
+                self._robot.driver.follow_truly(Segment(rows_from_start, 0.0))
             except MotionFailed as failed:
                 if failed.failure.kind == "path_blocked":
                     self._robot.metres += float(np.linalg.norm((self._robot.true_base() - start)[:2]))
@@ -95,7 +95,7 @@ class Driving:
                     self._robot.driver.put(Configuration(self._back_off(back, arm, touched), arm, opening))
                     class_name = self._robot.room.world.bodies[struck].record.class_name
                     return MotionFailed("path_blocked", f"the base touched {class_name}", (class_name,))
-                self._seen.obstacles.driven(*(at + self._robot.error)[:2])
+                self._seen.obstacles.driven(*(at + self._robot.driver.error)[:2])
             rolled = float(np.linalg.norm((row - reached)[:2]))
             self._robot.metres += rolled
             self._robot.seconds_aside += rolled / self._robot.description.base_speed
@@ -109,7 +109,7 @@ class Driving:
         (2,) of that, of the true room."""
         contacts = self._robot.room.world.contacts(self._robot.driver.robot.body_id)
         of_it = [c for c in contacts if self._robot.room.world.name_of(c.other_body) == struck and c.depth > TOUCHES]
-        cells = {cell_of(*(c.point[:2] + self._robot.error[:2])) for c in of_it}
+        cells = {cell_of(*(c.point[:2] + self._robot.driver.error[:2])) for c in of_it}
         self._seen.obstacles.add(Sweep(np.zeros((0, 2), int), np.array(sorted(cells), int).reshape(-1, 2), ()))
         return np.mean([c.point[:2] for c in of_it], axis=0)
 
@@ -136,13 +136,13 @@ class Driving:
         short = (away - start[2] + pi) % (2 * pi) - pi
         turns = [self._room_to_turn(start, turn) for turn in (short, short - np.copysign(2 * pi, short))]
         base = start + (0.0, 0.0, min(turns, key=lambda turn: abs((turn - short + pi) % (2 * pi) - pi)))
-        arm, opening = self._robot.arm + self._robot.joint_error, self._robot.driver.robot.configuration().opening
+        arm, opening = self._robot.arm + self._robot.driver.encoders, self._robot.driver.robot.configuration().opening
         self._robot.driver.put(Configuration(base, arm, opening))
         self._robot.seconds_aside += 1.0
 
     def _room_to_turn(self, start: np.ndarray, turn: float) -> float:
         """Return how far a base (3,) turns on the spot, at most by an angle [rad], before it touches something."""
-        arm = self._robot.arm + self._robot.joint_error
+        arm = self._robot.arm + self._robot.driver.encoders
         self._robot.driver.robot.set_body(np.concatenate([start, arm]))
         before, free = self._touching_depths(), 0.0
         for yaw in np.linspace(0.0, turn, int(abs(turn) / TURN_STEP) + 2)[1:]:
@@ -163,11 +163,6 @@ class Driving:
             if name is not None and world.bodies[name].record.class_name != "floor" and contact.depth > TOUCHES:
                 depths[name] = max(contact.depth, depths.get(name, 0.0))
         return depths
-
-
-def _whole_body_rows(bases: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Return (N, 3 + J) rows of base poses (N, 3) with one arm (J,)."""
-    return np.concatenate([bases, np.tile(arm, (len(bases), 1))], axis=1)
 
 
 def _facing_on(start: np.ndarray, points: list[np.ndarray], turns: list[bool], goal: np.ndarray) -> list[np.ndarray]:

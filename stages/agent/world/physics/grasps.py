@@ -6,16 +6,11 @@ side that was seen to face a finger is enough: of the other one it is believed t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import FINGER_BAND, FINGER_DEPTH, PITCHES, hand_axes
 from scenewright.stages.kit.geometry.boxes import minimum_rectangle
 from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
-FINGER_DEPTH = 0.032
-"""How far the tool point goes in behind the front of a thing [m]."""
-FINGER_BAND = 0.011
-"""Half the breadth of a finger tip [m], and how far before and behind the tool point the fingers press."""
 MARGIN, TIGHT = 0.012, 0.005
 """Room between the open fingers and the thing, both sides together [m]: as wanted, and where nothing leaves as much. A
 near look tells the middle of what is 7 cm wide to 3 mm."""
@@ -30,7 +25,7 @@ LEAST = 10
 """Points between the fingers."""
 HEADINGS = 16
 """Headings of the hand that are tried all around, beside those along the sides of what was seen; by eye."""
-PITCHES = (np.pi / 2, 1.1, 0.7, 0.35, 0.0)
+FROM_ABOVE = PITCHES[::-1]
 """How steeply the hand comes, from above first [rad]: the flatter, the farther the arm reaches over a table."""
 FORWARD_PITCHES = (0.15, 0.0, 0.35)
 """Pitches of the hand that goes into a shelf [rad], in the order in which they are tried."""
@@ -52,28 +47,12 @@ STRAIGHT = 0.8
 """The same of a hand that goes into a shelf, which has walls, and of a flat one, which sees no middle from aside."""
 
 
-@dataclass(frozen=True)
-class Jaws:
-    """What a grasp has to know of a hand [m]."""
-
-    opening: float
-    half_palm: tuple[float, float]
-    """Half the palm's extent along which the fingers close, and across: it comes no nearer than fingers are long."""
-    tip_before: float
-    """The tool point lies this far behind the finger tips."""
-
-    @classmethod
-    def of(cls, robot: RobotDescription) -> Jaws:
-        """Return those of a robot."""
-        return cls(robot.opening, (robot.palm[0] / 2, robot.palm[1] / 2), robot.tip_overhang)
-
-
 def antipodal_grasps(
     points: np.ndarray,
     normals: np.ndarray,
-    jaws: Jaws,
+    robot: RobotDescription,
     floor: float,
-    pitches: tuple[float, ...] = PITCHES,
+    pitches: tuple[float, ...] = FROM_ABOVE,
     margin: float = MARGIN,
 ) -> list[np.ndarray]:
     """Return map_from_tool (4, 4) of grasps of points (N, 3) with normals, of the first pitch first, where the fingers
@@ -91,10 +70,10 @@ def antipodal_grasps(
         heights = [deepest] if pitch > STEEP else [low[2] + share * (high[2] - low[2]) for share in HEIGHTS]
         for height in heights:
             at = np.array(
-                [*_middle_above(points, height), max(height, floor + 0.004 + jaws.tip_before * np.sin(pitch))]
+                [*_middle_above(points, height), max(height, floor + 0.004 + robot.tip_overhang * np.sin(pitch))]
             )
             for number, heading in enumerate(headings):
-                grasp = _grasp_at(points, normals, at, heading, pitch, jaws, margin)
+                grasp = _grasp_at(points, normals, at, heading, pitch, robot, margin)
                 if grasp is not None:
                     pose, square, width = grasp
                     off = round(abs(height - (low[2] + high[2]) / 2) / OFF)
@@ -113,17 +92,22 @@ def _middle_above(points: np.ndarray, height: float) -> np.ndarray:
 
 
 def _grasp_at(
-    points: np.ndarray, normals: np.ndarray, at: np.ndarray, heading: float, pitch: float, jaws: Jaws, margin: float
+    points: np.ndarray,
+    normals: np.ndarray,
+    at: np.ndarray,
+    heading: float,
+    pitch: float,
+    robot: RobotDescription,
+    margin: float,
 ) -> tuple[np.ndarray, float, float] | None:
     """Return map_from_tool (4, 4) with the tool at a point, how squarely the fingers meet the surface, and the width
     [m] there; None where it is too wide or in the way of the palm."""
-    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
-    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
-    axes = np.column_stack([np.cross(closing, approach), closing, approach])
+    axes = hand_axes(heading, pitch)
+    _, closing, approach = np.ascontiguousarray(axes.T)
     aside, along, depth = ((points - at) @ axes).T
     level, near, deepest = pitch < LEVEL, np.abs(aside) < FINGER_BAND, FINGER_DEPTH - BEFORE_PALM
     front = float(np.percentile(depth[near], 3)) if level and near.any() else 0.0
-    way_in = near & (depth < jaws.tip_before + (front + deepest if level else 0.0))
+    way_in = near & (depth < robot.tip_overhang + (front + deepest if level else 0.0))
     between = way_in if level else way_in & (depth > -FINGER_BAND)  # a level hand may see but a front
     if between.sum() < LEAST:
         return None
@@ -134,8 +118,8 @@ def _grasp_at(
     if level:
         deeper = max(0.0, front + min((last - first) / 2, deepest))
         depth = depth - deeper
-    under_palm = (np.abs(along) < jaws.half_palm[0]) & (np.abs(aside) < jaws.half_palm[1])
-    room = (jaws.opening - margin) / 2
+    under_palm = (np.abs(along) < robot.palm[0] / 2) & (np.abs(aside) < robot.palm[1] / 2)
+    room = (robot.opening - margin) / 2
     if np.abs(along[way_in]).max() > room or (under_palm & (depth < -FINGER_DEPTH - BEFORE_PALM)).sum() > LEAST:
         return None
     facing = np.abs(normals @ closing)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import hypot
 
 import numpy as np
-from scenewright.stages.agent.senses import Base, Felt, Position, Take
+from scenewright.stages.agent.senses import CANDIDATES, Base, Felt, Position, Take
 from scenewright.stages.agent.world.physics.eyes import Surface
 from scenewright.stages.agent.world.physics.grasps import LEVEL
 from scenewright.stages.agent.world.physics.hands import Motion, Target, graspable, plan_grasp, reachable
@@ -52,7 +52,7 @@ class Handling:
         hold = self._robot.hold
         return hold is None or float(-hold.rotation[2, 2]) < np.sin(LEVEL)
 
-    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False) -> Felt:
+    def grasp(self, at: Position, label: str, candidate: int, *, level: bool = False, most: int = CANDIDATES) -> Felt:
         """Take the surface that was seen at a position. A slip and a wrong thing are not felt."""
         meant = self._nearest_thing(at)
         step = f"grasp {meant}" if meant and self._robot.room.things[meant].label == label else f"grasp a {label}"
@@ -60,7 +60,7 @@ class Handling:
             self._robot.log.done("grasp", step, False, "api", "")
             return Felt(False, "no_grasp")
         try:
-            self._take(at, candidate, level=level)
+            self._take(at, candidate, level=level, most=most)
         except MotionFailed as failed:
             self._robot.draw_in()
             self._robot.log.done("grasp", step, False, "grasp", "")
@@ -84,13 +84,14 @@ class Handling:
         if self._seen.nearest(at) is None:
             self._seen.surfaces = before
 
-    def _take(self, at: Position, candidate: int, *, level: bool) -> None:
+    def _take(self, at: Position, candidate: int, *, level: bool, most: int) -> None:
         self._see_from_here(at)
         self._robot.beliefs.hold(None)
         target = self._target(at, candidate, level=level)
         if target is None:
             raise MotionFailed("no_grasp", "no surface was seen there")
-        motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, _chance(candidate))
+        chance = _chance(candidate)
+        motion = plan_grasp(self._robot.beliefs, self._robot.believed, self._robot.arm, target, chance, most)
         self._robot.grasps += 1
         self._robot.carry_out(motion.there)
         self._close_hand()
@@ -208,11 +209,9 @@ class Handling:
         if released is not None:
             self._robot.room.moved[released] += 1
         back = np.concatenate([self._robot.arm[None], motion.away[0].path[:, 3:]])
-        rows = whole_body(self._robot.true_base(), back)
+        first = replace(motion.away[0], path=whole_body(self._robot.believed, back))
         try:
-            self._robot.carry_out(
-                (Segment(rows, self._robot.description.opening, motion.away[0].pace), *motion.away[1:])
-            )
+            self._robot.carry_out((first, *motion.away[1:]))
         except MotionFailed:
             self._robot.draw_in()  # it let go already: what became of it is for the eyes
         self._robot.driver.wait(0.5)

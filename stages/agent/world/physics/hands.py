@@ -5,19 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scenewright.stages.agent.senses import CANDIDATES
 from scenewright.stages.agent.world.physics.beliefs import Beliefs, Box, Hold
 from scenewright.stages.agent.world.physics.eyes import Surface
 from scenewright.stages.agent.world.physics.grasps import (
     FORWARD_PITCHES,
+    FROM_ABOVE,
     MARGIN,
-    PITCHES,
     STRAIGHT,
     TIGHT,
-    Jaws,
     antipodal_grasps,
     within_reach,
 )
 from scenewright.stages.kit.acting.hand.attempts import first_motion
+from scenewright.stages.kit.acting.hand.grip import hand_axes, narrowest_width
 from scenewright.stages.kit.acting.hand.rim_grasps import rim_grasps
 from scenewright.stages.kit.acting.query import touching
 from scenewright.stages.kit.geometry.transforms import inverse
@@ -25,13 +26,11 @@ from scenewright.stages.kit.motion.arm_motion import ArmPlanner, Tally
 from scenewright.stages.kit.motion.base_placement import in_arm_frame, shoulder_distance
 from scenewright.stages.kit.motion.cartesian import drawn_back, raised
 from scenewright.stages.kit.motion.failures import MotionFailed
-from scenewright.stages.kit.motion.grasps import narrowest_width
 from scenewright.stages.kit.motion.kinematics import inverse_kinematics, random_starts
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration
+from scenewright.stages.kit.simulation.robot_description import RobotDescription
 
-CANDIDATES = 40
-"""Grasps that are tried, those from above first: eight of each of five pitches; Han 2024, 3.3.3, has 20 from above."""
 NEXT = 3
 """Grasps that have their turn last after one slipped."""
 APPROACH, LIFT, LIFT_INSIDE = 0.08, 0.10, 0.03
@@ -100,19 +99,18 @@ def reachable(
 
 def pointing(heading: float, pitch: float) -> np.ndarray:
     """Return a tool pose (4, 4) at the origin that comes along a heading, `pitch` [rad] downwards."""
-    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
-    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
     pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([np.cross(closing, approach), closing, approach])
+    pose[:3, :3] = hand_axes(heading, pitch)
     return pose
 
 
 def plan_grasp(
-    beliefs: Beliefs, base: np.ndarray, arm: np.ndarray, target: Target, random: np.random.Generator
+    beliefs: Beliefs, base: np.ndarray, arm: np.ndarray, target: Target, random: np.random.Generator, most: int
 ) -> Motion:
-    """Return the motion that takes a fused surface. Raises MotionFailed: `no_grasp`, or what ended most attempts."""
+    """Return the motion that takes a fused surface, `most` grasps tried. Raises MotionFailed: `no_grasp`, or what ended
+    most attempts."""
     surface, name = target.surface, target.name
-    possible = grasps_of(target, base, Jaws.of(beliefs.description))
+    possible = grasps_of(target, base, beliefs.description)
     if not possible:
         opening, width = beliefs.description.opening, narrowest_width(surface.points[_inside(surface)])
         raise MotionFailed(
@@ -122,7 +120,7 @@ def plan_grasp(
             {"width": width, "opening": opening},
         )
     left_out = target.rank * NEXT % len(possible)  # where few are possible, the first has its turn again
-    grasps = (possible[left_out:] + possible[:left_out])[:CANDIDATES]
+    grasps = (possible[left_out:] + possible[:left_out])[:most]
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
     attempts = (_one_grasp(planner, base, arm, target, grasp, tally) for grasp in grasps)
     motion = first_motion(attempts, SEARCHES)
@@ -135,19 +133,19 @@ def graspable(beliefs: Beliefs, base: np.ndarray, target: Target, random: np.ran
     """Whether the hand gets straight to some grasp of a fused surface from a base pose (3,) and up again, free of all
     that is in the map."""
     planner, tally = ArmPlanner(beliefs, random, SAMPLES), Tally()
-    carry, grasps = beliefs.description.carry, grasps_of(target, base, Jaws.of(beliefs.description))[:CANDIDATES]
+    carry, grasps = beliefs.description.carry, grasps_of(target, base, beliefs.description)[:CANDIDATES]
     return any(_way_in(planner, base, carry, target, grasp, tally) is not None for grasp in grasps)
 
 
-def grasps_of(target: Target, base: np.ndarray, jaws: Jaws) -> list[np.ndarray]:
+def grasps_of(target: Target, base: np.ndarray, robot: RobotDescription) -> list[np.ndarray]:
     """Return the grasps of what was seen, map_from_tool (4, 4), that an arm on a base pose (3,) may get at."""
     surface = target.surface
     keep = _inside(surface)
     points, normals = surface.points[keep], surface.normals[keep]
     inside, heading = target.behind > 0, np.arctan2(*(surface.middle[:2] - base[:2])[::-1])
-    pitches = FORWARD_PITCHES if inside or target.level else PITCHES
+    pitches = FORWARD_PITCHES if inside or target.level else FROM_ABOVE
     for margin in (MARGIN, TIGHT):
-        grasps = antipodal_grasps(points, normals, jaws, target.floor, pitches, margin)
+        grasps = antipodal_grasps(points, normals, robot, target.floor, pitches, margin)
         grasps = within_reach(grasps, target.inward, STRAIGHT) if inside else within_reach(grasps, heading)
         if grasps:
             break
@@ -219,7 +217,7 @@ def _taken_along(
         map_from_tool[:3, :3],
         beliefs.description.carry,
     )
-    beliefs.world.set_pose(target.name, _far())
+    beliefs.world.set_pose(target.name, raised(np.eye(4), -5.0))  # out of the way
     in_hand = planner.under(beliefs.hold(hold))
     home = in_hand.folding(base, lift[-1], Tally())
     if home is None:
@@ -270,9 +268,3 @@ def _by_another_elbow(
         if solution.found and planner.free(base, solution.arm, tally):
             return solution.arm
     return None
-
-
-def _far() -> np.ndarray:
-    pose = np.eye(4)
-    pose[2, 3] = -5.0
-    return pose

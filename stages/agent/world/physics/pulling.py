@@ -289,7 +289,7 @@ class Pulling:
         robot.carry_out(tuple(there[start:]))
         if there[start].label == "pull" and robot.driver.robot.configuration().opening < NOTHING_GRIPPED:
             return front.value, True
-        return max(0.0, front.felt(self._tool(robot.measured_arm()), shut)), False
+        return max(0.0, front.felt(self._tool(robot.driver.measured_arm()), shut)), False
 
     def _see_opening(self, front: Front, value: float) -> float:
         """Return how far a front is open as seen from here; the `value` that was felt, which is finer, where it is not

@@ -1,8 +1,7 @@
 """The robot itself: where it is and where it believes to be, its arm by its encoders, what moves it, its clock.
 
-Two frames: the true one, in which pybullet lives, and the map's, which is where localisation says that things are.
-Between them lies an error that is drawn anew wherever the base comes to a stop. Joints stand a little beside where
-their encoders say.
+Two frames: the true one, in which pybullet lives, and the map's, which is where localisation says that things are
+(`ErringRobot`).
 """
 
 from __future__ import annotations
@@ -17,12 +16,11 @@ from scenewright.stages.agent.world.events import EventLog
 from scenewright.stages.agent.world.failures import Rates
 from scenewright.stages.agent.world.physics.beliefs import Beliefs, Hold
 from scenewright.stages.agent.world.physics.room import Room
+from scenewright.stages.kit.acting.erring_robot import ErringRobot
 from scenewright.stages.kit.acting.errors import Luck
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 from scenewright.stages.kit.motion.failures import MotionFailed
 from scenewright.stages.kit.motion.kinematics import forward
-from scenewright.stages.kit.motion.physical_robot import PhysicalRobot
-from scenewright.stages.kit.motion.robot_errors import encoder_errors
 from scenewright.stages.kit.motion.segments import Segment, whole_body
 from scenewright.stages.kit.simulation.robot import Configuration, base_pose
 from scenewright.stages.kit.simulation.robot_description import RobotDescription, load_robot
@@ -69,19 +67,14 @@ class RobotInRoom:
         self.random = np.random.default_rng([seed, 83])
         self.description = driving_robot(robot)
         self.beliefs = Beliefs(self.description)
-        self.joint_error = encoder_errors(self.random, len(self.description.arm_joints))
-        self.error = np.zeros(3)
-        """Of localisation: what is believed less what is true, as of the last stop."""
         x, y, yaw = room.apartment.start
         if any(room.gap(piece, x, y) < 0.5 for piece in room.apartment.furniture):
             x, y = x + NEARER * cos(yaw), y + NEARER * sin(yaw)
         self.believed = np.array([x, y, yaw])
         self.arm = self.description.carry
-        start = Configuration(self.believed, self.arm + self.joint_error, self.description.opening)
-        # a hand's fingers go together: with a motor each, what they hold slides between them by centimetres
-        hand = replace(self.description, coupled_fingers=True)
-        self.driver = PhysicalRobot(room.world, hand, start, record_rate=1.0)
-        self.driver.put(start)
+        start = Configuration(self.believed, self.arm, self.description.opening)
+        self.driver = ErringRobot(room.world, self.description, start, 1.0, self.random)
+        self.driver.put_arm(self.arm, start.opening)
         self.hold: Hold | None = None
         """What it believes to hold."""
         self.carried: str | None = None
@@ -119,36 +112,32 @@ class RobotInRoom:
 
     def arm_to(self, arm: np.ndarray) -> None:
         """Bring the arm to joint values; with empty hands it is put there."""
-        base = self.true_base()
         self.seconds_aside += LOOK_SECONDS
         if self.hold is None:
-            opening = self.driver.robot.configuration().opening
-            self.driver.put(Configuration(base, arm + self.joint_error, opening))
+            self.driver.put_arm(arm, self.driver.robot.configuration().opening)
         else:
-            rows = whole_body(base, np.array([self.arm, arm]) + self.joint_error)
             try:
-                self.carefully(Segment(rows, 0.0, 0.6))
+                self._carefully(
+                    Segment(whole_body(self.believed, np.array([self.arm, arm])), 0.0, 0.6), self.true_base()
+                )
             except MotionFailed:
-                arm = self.measured_arm()  # something is in the way: it looks from where it got to
+                arm = self.driver.measured_arm()  # something is in the way: it looks from where it got to
         self.arm = arm
 
     def draw_in(self) -> None:
         """Draw the arm in after a motion that could not be planned or was stopped, with what it holds."""
         if self.hold is not None:
-            self.arm = self.measured_arm()
+            self.arm = self.driver.measured_arm()
             self.arm_to(self.home)
             return
         self.arm = self.description.carry
-        self.driver.put(Configuration(self.true_base(), self.arm + self.joint_error, self.description.opening))
+        self.driver.put_arm(self.arm, self.description.opening)
 
-    def measured_arm(self) -> np.ndarray:
-        """Return the joint values (J,) by the encoders."""
-        return self.driver.robot.configuration().arm - self.joint_error
-
-    def carefully(self, segment: Segment) -> None:
-        """Follow a segment; what slips out of the hand is not noticed. Raises MotionFailed `path_blocked`."""
+    def _carefully(self, segment: Segment, base: np.ndarray) -> None:
+        """Move the arm along a segment; what slips out of the hand is not noticed. Raises MotionFailed
+        `path_blocked`."""
         try:
-            self.driver.follow(segment, None)
+            self.driver.move_arm(segment, base)
         except MotionFailed as failed:
             if failed.failure.kind != "grasp_lost":
                 raise
@@ -157,10 +146,8 @@ class RobotInRoom:
         """Follow planned motions of the arm where the base stands. Raises MotionFailed `path_blocked`."""
         base = self.true_base()
         for segment in segments:
-            arms = segment.path[:, 3:]
-            rows = whole_body(base, arms + self.joint_error)
-            self.carefully(replace(segment, path=rows, event=""))
-            self.arm = arms[-1]
+            self._carefully(replace(segment, event=""), base)
+            self.arm = segment.path[-1, 3:]
 
     def in_hand(self, points: np.ndarray) -> np.ndarray:
         """Return (N,) bool: points (N, 3) of the map that are of what it believes to hold, or next to it."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import Grasp
 from scenewright.stages.kit.geometry.transforms import apply, inverse
-from scenewright.stages.kit.motion.grasps import Grasp
 
 DEPTH = 0.024
 """How far the tool point goes below the rim [m]."""

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from scenewright.stages.kit.acting.hand.grip import FINGER_BAND, FINGER_DEPTH, PITCHES, Grasp, hand_axes
 from scenewright.stages.kit.geometry.transforms import apply, inverse
 
-FINGER_DEPTH = 0.032
-"""How far the tool point can go in behind the front of an item before the palm touches it [m]."""
-FINGER_BAND = 0.011
-"""Half the breadth of a finger tip [m]: what lies within it is between the fingers."""
 MARGIN = 0.006
 """Room left between the open fingers and the item, both sides together [m]."""
 CONTACT_BAND = 0.003
@@ -21,17 +16,6 @@ ALIGNED = 0.004
 """Headings are as good as the narrowest one when the item is at most this much wider there [m]."""
 
 
-@dataclass(frozen=True)
-class Grasp:
-    """A pose of the tool relative to the item. Tool: z out of the hand, y along which the fingers close."""
-
-    body_from_tool: np.ndarray
-    width: float
-    """Extent of the item between the fingers [m]."""
-    pitch: float
-    """Downward tilt of the approach: 0 from the side, pi/2 from above [rad]."""
-
-
 def sample_grasps(
     points: np.ndarray,
     normals: np.ndarray,
@@ -40,7 +24,7 @@ def sample_grasps(
     opening: float,
     random: np.random.Generator,
     angles: int = 16,
-    pitches: tuple[float, ...] = (0.0, 0.35, 0.7, 1.1, np.pi / 2),
+    pitches: tuple[float, ...] = PITCHES,
     heights: tuple[float, ...] = (0.35, 0.5, 0.65, 0.8),
     friction: float = np.inf,
 ) -> list[Grasp]:
@@ -86,13 +70,6 @@ def _square(normals: np.ndarray, out: np.ndarray, friction: float) -> bool:
     return float(np.linalg.norm(mean - away * out)) <= friction * away
 
 
-def narrowest_width(points: np.ndarray) -> float:
-    """Return the smallest horizontal extent [m] of points (N, 3) over all directions: why no grasp was found."""
-    directions = np.linspace(0, np.pi, 36, endpoint=False)
-    along = points[:, :2] @ np.array([np.cos(directions), np.sin(directions)])
-    return float((along.max(axis=0) - along.min(axis=0)).min())
-
-
 def _aligned_headings(world_from_body: np.ndarray) -> np.ndarray:
     yaw = np.arctan2(world_from_body[1, 0], world_from_body[0, 0])
     return yaw + np.pi / 2 * np.arange(4)
@@ -110,9 +87,8 @@ def _grasp_at(
     friction: float,
 ) -> tuple[np.ndarray, float] | None:
     """Return world_from_tool (4, 4) and the width, or None where the item is too wide or fingers would slip."""
-    approach = np.array([np.cos(heading) * np.cos(pitch), np.sin(heading) * np.cos(pitch), -np.sin(pitch)])
-    closing = np.array([-np.sin(heading), np.cos(heading), 0.0])
-    across = np.cross(closing, approach)
+    axes = hand_axes(heading, pitch)
+    across, closing, approach = np.ascontiguousarray(axes.T)
     axis_point = np.array([*(low + high)[:2] / 2, low[2] + height * (high[2] - low[2])])
     relative = points - axis_point
     band = np.abs(relative @ across) < FINGER_BAND
@@ -133,6 +109,6 @@ def _grasp_at(
     ):
         return None
     pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([across, closing, approach])
+    pose[:3, :3] = axes
     pose[:3, 3] = axis_point + tool_depth * approach + (along.max() + along.min()) / 2 * closing
     return pose, width
