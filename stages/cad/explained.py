@@ -13,11 +13,11 @@ from scenewright.schemas.cad_scene import Explained
 from scenewright.schemas.scene_parts import SurfacePlane
 from scenewright.stages.cad.carcasses import Patches
 from scenewright.stages.cad.model_surfaces import ModelSurface, to_model, to_world
+from scenewright.stages.cad.nearest_triangles import nearest_triangles, tree_of
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.surroundings import compact
 from scenewright.stages.kit.formats.cad_models import part_transforms
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
-from scenewright.stages.kit.geometry.nearest_triangles import nearest_triangles, tree_of
 from scenewright.stages.kit.geometry.transforms import apply
 
 NEAR = 0.02

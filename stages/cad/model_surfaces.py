@@ -11,17 +11,11 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from scenewright.schemas.cad_library import CadModel
+from scenewright.stages.cad.nearest_triangles import TriangleTree, forest_of, nearest_below, nearest_triangles, tree_of
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.kit.compiled import compiled
 from scenewright.stages.kit.formats.cad_models import load_collision_parts, load_visual_parts, part_transforms
 from scenewright.stages.kit.formats.part_colors import vertex_colors
-from scenewright.stages.kit.geometry.nearest_triangles import (
-    TriangleTree,
-    forest_of,
-    nearest_below,
-    nearest_triangles,
-    tree_of,
-)
 from scenewright.stages.kit.geometry.transforms import apply
 
 SAMPLES = 300
@@ -165,8 +159,8 @@ def _closest(
                         normal[axis] += pose[other, axis] * normals[k, other]
             root = roots[part, SIDES]
             if len(normals):
-                axis = np.argmax(np.abs(normal))
-                root = roots[part, 2 * axis + (1 if normal[axis] > 0.0 else 0)]
+                along = np.argmax(np.abs(normal))
+                root = roots[part, 2 * along + (1 if normal[along] > 0.0 else 0)]
                 if root < 0:
                     root = roots[part, SIDES]
             found, row = nearest_below(forest, root, local, distance[k], foot, candidate)

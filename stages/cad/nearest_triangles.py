@@ -65,8 +65,8 @@ def forest_of(trees: Sequence[TriangleTree]) -> tuple[TriangleTree, np.ndarray]:
     links = [tree.links.copy() for tree in trees]
     for own, box, triangle in zip(links, boxes[:-1], triangles[:-1], strict=True):
         own[:, 0] += np.where(own[:, 1] > 0, triangle, box)
-    gathered = [np.concatenate(arrays) for arrays in zip(*(tree[:-1] for tree in trees), strict=True)]
-    return TriangleTree(*gathered, np.concatenate(links)), boxes[:-1]
+    whole = TriangleTree(*map(np.concatenate, zip(*trees, strict=True)))
+    return whole._replace(links=np.concatenate(links)), boxes[:-1]
 
 
 def nearest_triangles(tree: TriangleTree, points: np.ndarray, root: int = 0) -> NearestTriangle:

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenewright.stages.kit.geometry.nearest_triangles import LEAF, forest_of, nearest_triangles, tree_of
+from scenewright.stages.cad.nearest_triangles import LEAF, forest_of, nearest_triangles, tree_of
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
