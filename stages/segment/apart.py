@@ -99,15 +99,16 @@ def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: 
         for worker in set(multiprocessing.active_children()) - others:
             worker.kill()
         raise MachineFailure(
-            "a process that segments frames was killed", hint="memory may be short: OMP_NUM_THREADS=1 needs one process"
+            "a process that segments frames was killed, or did not start",
+            hint="memory may be short: OMP_NUM_THREADS=1 needs one process",
         ) from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _submitted(pool: ProcessPoolExecutor, index: int) -> Future[Segmented]:
-    """Hand a frame to a pool. Raises BrokenProcessPool also when a worker died while the next one was being started,
-    whose pipes are closed by then."""
+    """Hand a frame to a pool. Raises BrokenProcessPool also where a worker can't be started: the machine has no room, or
+    the one before it died meanwhile and closed the pipes that both share."""
     try:
         return pool.submit(_segment, index)
     except (OSError, ValueError) as error:

@@ -9,7 +9,7 @@ from scenewright.stages.agent.scene_map import Item, quarter
 from scenewright.stages.agent.senses import Position
 
 GRASPS = 20
-"""Candidates that are tried, those from above before others."""
+"""Grasps that are planned before it gives up, those from above first (Han 2024, section 3.3.3)."""
 SHORT = 0.1
 """Sides whose middle is this much farther from the target than the nearest are no "short distance" [m]."""
 

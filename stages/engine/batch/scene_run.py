@@ -201,7 +201,7 @@ def _describe(job: Job, watched: _Watched, follower: LogFollower) -> tuple[Outco
         return outcome, code, text
     if follower.error is None and outcome == "machine failure":  # which says why, where its log has room
         free = format_bytes(free_bytes(Path(job.folder)))
-        return outcome, code, f"its log ends before the reason, {free} are free at {job.folder}: the disk was full"
+        return outcome, code, f"its log ends before the reason, {free} are free at {job.folder}: was the disk full?"
     return outcome, code, follower.error or follower.last_line or f"exit code {code} and not a word"
 
 
