@@ -32,7 +32,8 @@ def unexplaining(
     """Return node -> why its model is none any more, for models that explain less than a share `least` of what was
     seen of their thing, where the arrangement put them.
 
-    The way along with what carries it, and up or down onto it, does not count: the graph asks for these.
+    The way along with what carries it, and up or down onto it, does not count: the graph asks for these. Surface is
+    explained within `NEAR` [m]. Raises BadInput for meshes that cannot be read.
     """
     why = {}
     for name, placement in arranged.placements.items():

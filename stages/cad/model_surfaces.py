@@ -137,15 +137,18 @@ class ModelSurface:
 
 
 @compiled
+def _side_of(normal: np.ndarray) -> int:
+    axis = int(np.argmax(np.abs(normal)))
+    return 2 * axis + (1 if normal[axis] > 0.0 else 0)
+
+
+@compiled
 def _closest(
     forest: TriangleTree, roots: np.ndarray, model_from_part: np.ndarray, points: np.ndarray, normals: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the fields of `Nearest` for parts with poses (P, 4, 4) in the model; normals (N, 3), or (0, 3) for any."""
-    distance, parts, triangles = (
-        np.full(len(points), np.inf),
-        np.zeros(len(points), np.int64),
-        np.zeros(len(points), np.int64),
-    )
+    distance = np.full(len(points), np.inf)
+    parts, triangles = np.zeros(len(points), np.int64), np.zeros(len(points), np.int64)
     nearest, facing = np.zeros((len(points), 3)), np.zeros((len(points), 3))
     local, normal, foot, candidate = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(points)):
@@ -159,8 +162,7 @@ def _closest(
                         normal[axis] += pose[other, axis] * normals[k, other]
             root = roots[part, SIDES]
             if len(normals):
-                along = np.argmax(np.abs(normal))
-                root = roots[part, 2 * along + (1 if normal[along] > 0.0 else 0)]
+                root = roots[part, _side_of(normal)]
                 if root < 0:
                     root = roots[part, SIDES]
             found, row = nearest_below(forest, root, local, distance[k], foot, candidate)
@@ -175,10 +177,13 @@ def _closest(
     return distance, nearest, facing, parts, triangles
 
 
+@compiled
 def facing_side(normals: np.ndarray) -> np.ndarray:
     """Return the side (N,) that normals (N, 3) face: 2 * axis, + 1 when they point along the axis."""
-    axis = np.argmax(np.abs(normals), axis=1)
-    return 2 * axis + (normals[np.arange(len(normals)), axis] > 0)
+    sides = np.empty(len(normals), np.int64)
+    for k in range(len(normals)):
+        sides[k] = _side_of(normals[k])
+    return sides
 
 
 def load_surface(folder: Path, model: CadModel) -> ModelSurface:

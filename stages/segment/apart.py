@@ -107,7 +107,7 @@ def segmented_apart(request: BackendRequest, streams: tuple[str, ...], workers: 
 
 
 def _submitted(pool: ProcessPoolExecutor, index: int) -> Future[Segmented]:
-    """Hand a frame to a pool. Raises BrokenProcessPool also where a worker can't be started: the machine has no room, or
+    """Hand a frame to a pool. Raises BrokenProcessPool also where a worker does not start: the machine has no room, or
     the one before it died meanwhile and closed the pipes that both share."""
     try:
         return pool.submit(_segment, index)

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 MOST_FILLED = 0.2
 """Share of a piece that was seen that may lie in space seen to be empty, as posts are some voxels wide; of
-what is inferred, none."""
+what is inferred, none but its rim (`UNSURE`)."""
 SEEN_THROUGH, ASIDE, APRON = 0.1, 0.05, 0.1
 """Below a top, this share of the room was seen empty, so far from its edges and from top and ground [m]: what nobody
 saw through may be a box."""
