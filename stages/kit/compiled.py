@@ -118,6 +118,24 @@ class _ShowsCompilation(event.Listener):  # type: ignore[misc]
         self._open.pop().close()
 
 
+class _KeptFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
+    """numba's files of kept code. One that is torn, or speaks of a class that has since moved, is as if it were not
+    there; numba would end the program."""
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        try:
+            return super()._load_data(name)
+        except Exception as error:
+            raise FileNotFoundError(name) from error  # which numba takes for code that is not kept
+
+
+caching.IndexDataCacheFile = _KeptFiles  # type: ignore[misc]
 event.register("numba:compile", _ShowsCompilation())
 if not config.CACHE_LOCATOR_CLASSES:  # type: ignore[attr-defined]
     config.CACHE_LOCATOR_CLASSES = ",".join(  # type: ignore[attr-defined]

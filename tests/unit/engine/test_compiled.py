@@ -52,6 +52,16 @@ def test_an_edit_of_another_file_compiles_anew(tmp_path: Path, change: dict[str,
     assert outcome(tmp_path, **change) == [value, 0]
 
 
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_kept_code_that_is_torn_is_compiled_anew(tmp_path: Path, kind: str) -> None:
+    outcome(tmp_path)
+    kept = list((tmp_path / "__pycache__").glob(f"*.{kind}"))
+    for file in kept:
+        file.write_bytes(file.read_bytes()[:-20])
+    assert kept and outcome(tmp_path) == [6.0, 0]
+    assert outcome(tmp_path) == [6.0, 1]
+
+
 def test_compilation_is_said_once_and_timed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
