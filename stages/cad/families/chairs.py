@@ -35,6 +35,8 @@ POST = 0.06
 """The posts of a back with gaps are within so much of its ends [m]."""
 THIN, SLAB = 0.02, 10
 """Least thickness of a back [m]; of its surface this percentage may lie before it, and behind."""
+SAME_END = 0.05
+"""A seat and its back end at the same place where these are so near [m]."""
 LEG = 0.04
 """Width of legs that nobody saw [m]; by eye."""
 
@@ -57,11 +59,12 @@ def read(reading: Reading) -> Form | str:
     back = _back(own, height, seat)
     if not back:
         return "it has no back"
-    legs = posts_below(seat, own) or corner_legs(seat, own, LEG)
+    legs = posts_below(seat, own)
+    legs += corner_legs(seat, own, LEG, legs)
     if not legs:
         return "nothing carries its seat"
-    if not _in_pairs(legs, seat):
-        return "a leg has no partner on the other side, so that part of its seat is hidden"
+    if not _in_pairs(legs, seat) and not _as_wide(seat, back):
+        return "a leg has no partner, and its seat is not as wide as its back, so that part of it is hidden"
     return Form("chair", ("chair",), (seat, *back, *legs), own.turn)
 
 
@@ -71,6 +74,15 @@ def _in_pairs(legs: Sequence[Piece], seat: Piece) -> bool:
     half = seat.corners[:, 0].max() - middle
     off = np.array([0.5 * (leg.corners[:, 0].min() + leg.corners[:, 0].max()) - middle for leg in legs])
     return np.count_nonzero(off > ASIDE * half) == np.count_nonzero(off < -ASIDE * half)
+
+
+def _as_wide(seat: Piece, back: Sequence[Piece]) -> bool:
+    """Whether a seat ends at either side where its back does."""
+    ends = [
+        np.array([f(corners[:, 0]) for f in (np.min, np.max)]) for corners in (seat.corners, *(p.corners for p in back))
+    ]
+    whole = np.array([min(low for low, _ in ends[1:]), max(high for _, high in ends[1:])])
+    return bool(np.all(np.abs(whole - ends[0]) < SAME_END))
 
 
 def _back_behind(reading: Reading, seat: float) -> Reading:

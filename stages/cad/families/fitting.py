@@ -9,7 +9,7 @@ import numpy as np
 from scenewright.stages.cad.built_ins import EXPLAINED
 from scenewright.stages.cad.carcasses import Patches, patches_of
 from scenewright.stages.cad.explained import NEAR
-from scenewright.stages.cad.families import chairs, shelves, sofas, tables
+from scenewright.stages.cad.families import cabinets, chairs, shelves, sofas, tables
 from scenewright.stages.cad.families.forms import Form, Reading
 from scenewright.stages.cad.families.reading import further_pieces
 from scenewright.stages.cad.target import Surroundings, support_height_of
@@ -20,6 +20,7 @@ from scenewright.stages.kit.geometry.steadiness import stands_steadily
 from scipy.spatial import cKDTree
 
 FAMILIES: Mapping[str, tuple[tuple[str, ...], Callable[[Reading], Form | str]]] = {
+    "cabinet": (("cabinet", "wall_cabinet", "drawer_unit", "wardrobe"), cabinets.read),
     "chair": (("chair",), chairs.read),
     "shelf": (("shelf", "wall_shelf"), shelves.read),
     "sofa": (("sofa", "bed"), sofas.read),
@@ -54,9 +55,8 @@ def surface_to_read(around: Surroundings, mesh: EntityMesh) -> Reading:
     links = [link for link in around.graph.links if link.source == around.node.id and link.relation in STANDS]
     boxes = [around.graph.node(link.target).box for link in links]
     carrying = tuple(bottom(child) for child in boxes if child is not None)
-    return Reading(
-        patches, support_height_of(around.node), np.eye(3), around.free_space, cKDTree(mesh.vertices), carrying
-    )
+    height, own = support_height_of(around.node), cKDTree(mesh.vertices)
+    return Reading(patches, height, np.eye(3), around.free_space, own, carrying, around.hangs)
 
 
 def fit(family: str, reading: Reading, within: float = NEAR) -> Fitted | str:
@@ -68,8 +68,9 @@ def fit(family: str, reading: Reading, within: float = NEAR) -> Fitted | str:
     if isinstance(form, str):
         return form
     own = reading.turned(form.turn)
-    more = further_pieces(list(form.pieces), own, form.distance(own.patches))
-    form = replace(form, pieces=(*form.pieces, *more))
+    if not form.leaves:  # what is beside or on a closed carcass is another thing
+        more = further_pieces(list(form.pieces), own, form.distance(own.patches))
+        form = replace(form, pieces=(*form.pieces, *more))
     free = form.classes[0] not in BUILT_IN
     if free and not stands_steadily([piece.corners for piece in form.pieces], reading.base):
         return "it would not stand"

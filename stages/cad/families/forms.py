@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scenewright.stages.cad.carcasses import Patches
@@ -40,7 +41,28 @@ class Piece:
     seen: bool = True
     """Whether surface of it was seen; else symmetry or the family says that it is there."""
     level: tuple[np.ndarray, np.ndarray] | None = None
-    """Low and high corner (3,) of the rectangle on which things can stand, where it has one."""
+    """Low and high corner (3,) of the least rectangle around where things can stand, where it has such a place."""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A part of a form that moves. Shut; frame of the thing."""
+
+    name: str
+    type: Literal["revolute", "prismatic"]
+    pieces: tuple[Piece, ...]
+    origin: np.ndarray
+    """(3,) on its axis [m]."""
+    axis: np.ndarray
+    """(3,) unit: it opens by a positive value."""
+    travel: float
+    """How far [rad] or [m]."""
+    handle: np.ndarray
+    """(3,) where it is grasped [m]."""
+    handle_axis: np.ndarray
+    """(3,) unit, along its bar."""
+    seen: bool = True
+    """Whether its bar was."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +75,13 @@ class Form:
     pieces: tuple[Piece, ...]
     turn: np.ndarray
     """(3, 3): world from the frame of the thing."""
+    leaves: tuple[Leaf, ...] = ()
 
     @cached_property
     def solids(self) -> list[Solid]:
-        """Its pieces as polyhedra, frame of the thing."""
-        return [hull_or_box(piece.corners) for piece in self.pieces]
+        """Its pieces and those of its leaves as polyhedra, frame of the thing."""
+        pieces = [*self.pieces, *(piece for leaf in self.leaves for piece in leaf.pieces)]
+        return [hull_or_box(piece.corners) for piece in pieces]
 
     def distance(self, patches: Patches) -> np.ndarray:
         """Return how far patches of surface, frame of the thing, are from it (N,) [m]."""
@@ -66,7 +90,7 @@ class Form:
     @property
     def words(self) -> str:
         """Its pieces in words."""
-        seen = [piece.name for piece in self.pieces if piece.seen]
+        seen = [piece.name for piece in self.pieces if piece.seen] + [leaf.name.split("_")[0] for leaf in self.leaves]
         inferred = [piece.name for piece in self.pieces if not piece.seen]
         listed = ", ".join(_counted(seen))
         return f"{listed}{INFERRED_WORDS}{', '.join(_counted(inferred))}" if inferred else listed
@@ -92,6 +116,8 @@ class Reading:
     """Of the vertices of the thing, world [m]."""
     carrying: tuple[float, ...] = ()
     """Heights at which things stand on it or in it [m]."""
+    hangs: bool = False
+    """Whether it stands on nothing: on a wall."""
 
     def turned(self, turn: np.ndarray) -> Reading:
         """Return it in another frame: `turn` (3, 3), world from that frame."""

@@ -113,9 +113,7 @@ def board_at(name: str, height: float, patches: Patches) -> Piece | None:
     outline = convex_hull(inside) if len(inside) >= 4 else np.zeros((0, 2))
     if len(outline) >= 3 and polygon_area(outline) < RECTANGULAR * float(np.prod(np.ptp(inside, axis=0))):
         corners = np.concatenate([np.column_stack([outline, np.full(len(outline), z)]) for z in (top - thick, top)])
-        half = np.sqrt(0.5) * 0.5 * (high - low)  # of the rectangle inside an ellipse
-        middle = 0.5 * (low + high)
-        return Piece(name, corners, True, (np.array([*(middle - half), top]), np.array([*(middle + half), top])))
+        return Piece(name, corners, True, (np.array([*low, top]), np.array([*high, top])))
     return box_piece(name, np.array([*low, top - thick]), np.array([*high, top]), carries=True)
 
 
@@ -179,8 +177,8 @@ def corner_legs(board: Piece, reading: Reading, width: float, beside: Sequence[P
     stands there already."""
     low, high = board.corners.min(axis=0), board.corners.max(axis=0)
     middle, half = 0.5 * (low + high)[:2], 0.5 * (high - low)[:2]
-    if board.level is not None and len(board.corners) > 8:  # of what is round, within its outline
-        half = 0.5 * (board.level[1] - board.level[0])[:2]
+    if len(board.corners) > 8:  # of what is round, within its outline
+        half = np.sqrt(0.5) * half
     steps = [np.arange(0.0, max(INSET * side, 1e-9), width) for side in half]
     insets = sorted(product(*steps), key=lambda inset: (math.hypot(*inset), inset))
     legs: list[Piece] = []

@@ -16,11 +16,12 @@ from scenewright.schemas.base import as_vector
 from scenewright.schemas.cad_library import CadModel, ModelState
 from scenewright.schemas.cad_scene import Inferred
 from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.scene_parts import Joint
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.explained import NEAR
 from scenewright.stages.cad.families.fitting import FAMILIES, Fitted, explains_clearly_more, fit, share, surface_to_read
-from scenewright.stages.cad.families.forms import INFERRED_WORDS, Form, Reading
+from scenewright.stages.cad.families.forms import INFERRED_WORDS, Form, Piece, Reading
 from scenewright.stages.cad.made_models import BODY, FAMILY, part_of, plane_of
 from scenewright.stages.cad.model_surfaces import ModelSurface, load_surface, robust_error, to_model, to_world
 from scenewright.stages.cad.parameters import CadParameters
@@ -37,6 +38,12 @@ WORKED_WITH = frozenset({"monitor", "keyboard", "mouse", "laptop"})
 """What stands on a desk, and tells it from a table."""
 CONTAINS = frozenset({"shelf", "wall_shelf"})
 """Classes in which things stand."""
+HANG = frozenset({"cabinet"})
+"""Families whose things may hang."""
+BESIDE, ALONG = 0.08, 0.12
+"""A handle of a model is the bar that was seen where it is so near to it, across it and along it [m]."""
+NEARLY = 0.05
+"""A form explains nearly as much as a model where its share is less by no more than this."""
 TRUNCATION = 0.05
 """Distances are cut off here when the cost of a form is measured, as those of models are [m]."""
 
@@ -63,7 +70,9 @@ def of_family(
     if not tried or node.box is None:
         return "nothing of its class is of a family"
     if target.around.hangs:
-        return "it hangs, and families stand"
+        tried = [name for name in tried if name in HANG]
+        if not tried:
+            return "it hangs, and what its class is a family of stands"
     reading = surface_to_read(target.around, mesh)
     fits = {name: fit(name, reading) for name in tried}
     found = [fitted for fitted in fits.values() if isinstance(fitted, Fitted)]
@@ -72,7 +81,9 @@ def of_family(
     best = likeliest(found, node.class_name, said, reading)
     if entry.placements:
         before = explained_by(entry.placements[0], target, reading)
-        if not explains_clearly_more(best.near, before, reading.patches):
+        nearly = best.explained >= share(before, reading.patches) - NEARLY
+        denied = nearly and contradicts_handles(entry.placements[0], best.form)
+        if not denied and not explains_clearly_more(best.near, before, reading.patches):
             shares = f"{best.explained:.0%} explained, by the model {share(before, reading.patches):.0%}"
             return f"a {best.form.family} of parts is not clearly better: {shares}"
     renamed = node.model_copy(update=class_of(node, best.form, said, carried_by(target)))
@@ -112,6 +123,23 @@ def explained_by(placement: Placement, target: Target, reading: Reading) -> np.n
     return np.asarray(placement.scale * nearest.distance < NEAR)
 
 
+def contradicts_handles(placement: Placement, form: Form) -> bool:
+    """Whether half of the bars that were seen on a thing, by its form, or more are no handles of a placed model."""
+    model = placement.shape.model
+    handles = [(np.asarray(j.handle), np.asarray(j.handle_axis)) for j in model.joints if j.handle and j.handle_axis]
+    places = to_world(placement, np.array([place for place, _ in handles]).reshape(-1, 3))
+    axes = np.array([axis for _, axis in handles]).reshape(-1, 3) @ placement.rotation.T
+    seen = [leaf for leaf in form.leaves if leaf.seen]
+    missing = 0
+    for leaf in seen:
+        axis = form.turn @ leaf.handle_axis
+        off = places - form.turn @ leaf.handle
+        along = off @ axis
+        across = np.linalg.norm(off - along[:, None] * axis, axis=1)
+        missing += not np.any((across < BESIDE) & (np.abs(along) < ALONG) & (np.abs(axes @ axis) > 0.8))
+    return 0 < len(seen) <= 2 * missing
+
+
 def rms(surface: ModelSurface, placement: Placement, target: Target) -> float:
     """Return the root mean square distance of the vertices of a thing from a placed model [m]."""
     return robust_error(surface, placement, target.points, None, math.inf)
@@ -147,17 +175,38 @@ def inferred_of(placement: Placement, surface: ModelSurface) -> Inferred | None:
     )
 
 
+def _solids(pieces: Sequence[Piece], origin: np.ndarray) -> list[Solid]:
+    return [hull_or_box(np.round(piece.corners - origin, 6)) for piece in pieces]
+
+
 def write_form(node: GraphNode, form: Form, folder: Path) -> tuple[Placement, ModelSurface]:
     """Write the model of a form and return where it stands, and its surface."""
-    corners = np.concatenate([piece.corners for piece in form.pieces])
+    corners = np.concatenate([solid.vertices for solid in form.solids])
     low, high = corners.min(axis=0), corners.max(axis=0)
     origin = np.array([*(0.5 * (low + high))[:2], low[2]])
-    solids: list[Solid] = [hull_or_box(np.round(piece.corners - origin, 6)) for piece in form.pieces]
+    solids = _solids(form.pieces, origin)
+    moving = [_solids(leaf.pieces, leaf.origin) for leaf in form.leaves]
     mass = substance_of(node.class_name).hull_density * volume(hull_or_box(corners))
-    body = part_of(BODY, solids, mass / sum(volume(solid) for solid in solids))
+    density = mass / sum(volume(solid) for some in (solids, *moving) for solid in some)
+    body = part_of(BODY, solids, density)
+    parts = [part_of(leaf.name, some, density) for leaf, some in zip(form.leaves, moving, strict=True)]
+    joints = tuple(
+        Joint(
+            name=f"{leaf.name}_joint",
+            type=leaf.type,
+            part=leaf.name,
+            origin=as_vector(leaf.origin - origin),
+            axis=as_vector(leaf.axis),
+            lower=0.0,
+            upper=round(leaf.travel, 4),
+            handle=as_vector(leaf.handle - origin),
+            handle_axis=as_vector(leaf.handle_axis),
+        )
+        for leaf in form.leaves
+    )
     levels = [piece.level for piece in form.pieces if piece.level is not None]
     state = ModelState(
-        joints={},
+        joints={joint.name: 0.0 for joint in joints},
         box_minimum=as_vector(low - origin),
         box_maximum=as_vector(high - origin),
         planes=tuple(plane_of(2, True, a - origin, b - origin) for a, b in levels),
@@ -165,14 +214,15 @@ def write_form(node: GraphNode, form: Form, folder: Path) -> tuple[Placement, Mo
     model = CadModel(
         id=folder.name,
         class_name=node.class_name,
-        articulated=False,
-        mass=body.properties.mass,
+        articulated=bool(joints),
+        mass=sum(part.properties.mass for part in (body, *parts)),
         states=(state,),
+        joints=joints,
         movable=load_vocabulary().by_name(node.class_name).movable,
-        contains=node.class_name in CONTAINS,
-        parts=(BODY,),
+        contains=bool(joints) or node.class_name in CONTAINS,
+        parts=(BODY, *(part.name for part in parts)),
         recipe={FAMILY: form.family, "pieces": form.words, INFERRED: " ".join(map(str, form.inferred))},
     )
-    write_model_folder(folder, model, [body])
+    write_model_folder(folder, model, [body, *parts])
     placement = Placement(shape_of_state(model, state), 1.0, form.turn, form.turn @ origin, 0.0, 0.0, 0.0)
     return placement, load_surface(folder, model)
