@@ -56,6 +56,11 @@ class CadMethod(Protocol):
         ...
 
     @property
+    def takes_light_out(self) -> bool:
+        """Whether the room's light is taken out of colours, by its walls."""
+        ...
+
+    @property
     def least_explained(self) -> float:
         """Share of the surface of its thing under which a model is none any more."""
         ...

@@ -84,6 +84,11 @@ class Ours:
         return self.parameters.shell
 
     @property
+    def takes_light_out(self) -> bool:
+        """A simulator puts light on colours anew."""
+        return True
+
+    @property
     def least_explained(self) -> float:
         """Half of it."""
         return LEAST_EXPLAINED

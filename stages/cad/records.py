@@ -47,11 +47,12 @@ def scene_file(
     explanation: Explanation,
     selection: Selection,
     conflicts_after: int,
+    gain: float,
 ) -> CadSceneFile:
     """Return scene.json: the decision on every node.
 
     `final`: cg'; `colors`: node -> part -> colour in the map; `evidence`: node -> joint -> why it is believed, for the
-    nodes where that was asked; `inferred`: node -> what is added to its mesh.
+    nodes where that was asked; `inferred`: node -> what is added to its mesh; `gain`: by how much light was multiplied.
     """
     replacements = []
     for node in graph.nodes:
@@ -107,6 +108,7 @@ def scene_file(
         conflicts_after=conflicts_after,
         iterations=selection.steps,
         explained_within=explanation.within,
+        light_gain=None if gain == 1.0 else gain,
     )
 
 

@@ -35,6 +35,7 @@ from scenewright.stages.cad.ours import Ours
 from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.recognition import named_by_people, renamed
 from scenewright.stages.cad.records import cad_graph, scene_file
+from scenewright.stages.cad.room_light import gain_by_walls, relight, relit
 from scenewright.stages.cad.scene_explanation import explanation_of
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.shell import drawn, shell_file, shell_of
@@ -130,7 +131,8 @@ def choose_and_write(
     with context.progress.step("writing"):
         if nameless is not None:
             write_surface(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
-        colors = colors_of_parts(graph, arranged, surfaces, panoptic_map)
+        gain = gain_of_light(graph, panoptic_map) if method.takes_light_out else 1.0
+        colors = colors_of_parts(graph, arranged, surfaces, panoptic_map, gain)
         evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
         explanation = explanation_of(graph, panoptic_map, arranged, shortlists, surfaces, context.output)
         if explanation.rest is not None:
@@ -148,10 +150,15 @@ def choose_and_write(
             explanation,
             selection,
             conflicts_after,
+            gain,
         )
         scene.write(context.output / "scene.json")
         final.write(context.output / "graph.json")
         copy_models(arranged, library, context)
+        if gain != 1.0:
+            folders = ("meshes", "layout", "shell")
+            files = [file for folder in folders for file in sorted((context.output / folder).glob("*.ply"))]
+            relight([*files, *context.output.glob(UNEXPLAINED)], gain)
 
     of_families = sum(is_of_family(placement.shape.model) for placement in arranged.placements.values())
     decisions = [replacement.decision for replacement in scene.replacements]
@@ -290,10 +297,23 @@ def move_meshes(arranged: Arrangement, folder: Path) -> None:
             write_surface(replace(mesh, vertices=mesh.vertices + shift), folder / f"{name}.ply")
 
 
+def gain_of_light(graph: ContactGraphFile, panoptic_map: PanopticMap) -> float:
+    """Return by how much linear light is multiplied so that walls reflect what walls do."""
+    files = [
+        panoptic_map.path(node.mesh) for node in graph.nodes if node.class_name == "wall" and node.mesh is not None
+    ]
+    colors = [load_entity_mesh(file).colors for file in files]
+    return gain_by_walls(np.concatenate([np.zeros((0, 3), np.uint8), *colors]))
+
+
 def colors_of_parts(
-    graph: ContactGraphFile, arranged: Arrangement, surfaces: dict[str, ModelSurface], panoptic_map: PanopticMap
+    graph: ContactGraphFile,
+    arranged: Arrangement,
+    surfaces: dict[str, ModelSurface],
+    panoptic_map: PanopticMap,
+    gain: float,
 ) -> dict[str, dict[str, tuple[int, int, int]]]:
-    """Return node -> part of its model -> colour that the map shows there."""
+    """Return node -> part of its model -> colour that the map shows there, under `gain` times the light."""
     colors = {}
     for name, placement in arranged.placements.items():
         node = graph.node(name)
@@ -303,7 +323,8 @@ def colors_of_parts(
         used = np.unique(mesh.faces)[::COLOR_STEP]
         normals = vertex_normals(mesh.vertices, mesh.faces)
         surface = surfaces[placement.shape.model.id]
-        colors[name] = part_colors(surface, placement, mesh.vertices[used], normals[used], mesh.colors[used])
+        seen = relit(mesh.colors[used], gain)
+        colors[name] = part_colors(surface, placement, mesh.vertices[used], normals[used], seen)
     return colors
 
 

@@ -48,6 +48,11 @@ class Thesis:
         return False
 
     @property
+    def takes_light_out(self) -> bool:
+        """Colours stay as cameras saw them."""
+        return False
+
+    @property
     def least_explained(self) -> float:
         """What was chosen stays."""
         return 0.0
