@@ -26,8 +26,8 @@ ALONG, ACROSS_BAR = 0.12, 0.03
 SHORTEST, LONG, WIDEST, ELONGATED = 0.05, 0.10, 0.08, 1.4
 """A bar is so long, so wide at most as the map shows it [m], and so many times as long as wide; one that is not long
 counts where it is in line with one that is."""
-FEWEST = 4
-"""Patches of surface of a bar."""
+FEWEST, LEAST = 4, 0.012
+"""Patches of surface of a bar; and the bar of a front that stands out most does so by as much [m]."""
 ENDS = (5, 95)
 """Between these percentiles of its surface a bar lies."""
 RIM = 0.01
@@ -94,6 +94,8 @@ def front_of(patches: Patches) -> Front | None:
     here = on_front & (heights > NOISES * noise) & (heights < MOST_HEIGHT)
     bars = in_line(bars_in(patches.points[here][:, [0, 2]], heights[here]))
     bars = tuple(bar for bar in bars if np.all((bar.low > low + RIM) & (bar.high < high - RIM)))
+    if max((bar.height for bar in bars), default=0.0) < LEAST:
+        bars = ()
     return Front(low, high, float(np.array([*(0.5 * (low + high)), 1.0]) @ plane), bars)
 
 

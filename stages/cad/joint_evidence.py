@@ -18,6 +18,7 @@ from scenewright.stages.cad.fitting import AJAR
 from scenewright.stages.cad.leaf_handles import handle_height
 from scenewright.stages.cad.leaf_seams import seam_contrast
 from scenewright.stages.cad.leaves import leaf_of, seen_on
+from scenewright.stages.cad.made_models import is_of_family
 from scenewright.stages.cad.model_surfaces import ModelSurface, to_model
 from scenewright.stages.cad.seen_motions import seen_motions
 from scenewright.stages.cad.shapes import Placement
@@ -58,7 +59,8 @@ def joint_evidence(
     local = to_model(placement, looked.vertices) * placement.scale
     facing = looked.normals @ placement.rotation
     nearest = surface.closest(local / placement.scale, placement.shape.joints)
-    fits = float(np.mean(placement.scale * nearest.distance < NEAR)) >= EXPLAINED
+    near = float(np.mean(placement.scale * nearest.distance < NEAR))
+    fits = near >= EXPLAINED or is_of_family(surface.model)  # which was made of what was seen
     motions = seen_motions(surface, placement, articulations)
     evidence: dict[str, JointEvidence] = {}
     for joint in surface.model.joints:

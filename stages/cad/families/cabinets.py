@@ -11,8 +11,10 @@ from scenewright.stages.cad.front_bars import Front, front_of
 from scenewright.stages.cad.front_leaves import FrontLeaf, leaves_of
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
-LEAST_DEPTH, LEAST_HEIGHT = 0.15, 0.2
-"""A cabinet is at least so deep and its front so high [m]."""
+LEAST_DEPTH, DEEPEST, LEAST_HEIGHT = 0.15, 0.8, 0.2
+"""A cabinet is at least so deep, at most so deep where the wall behind it tells, and its front so high [m]."""
+SAME_TOP = 0.05
+"""A front ends at the top where it ends so near to it [m]."""
 BOARD, FRONT, GAP, WALL = 0.018, 0.018, 0.002, 0.012
 """Thickness of boards, of fronts, and of what is behind a drawer's front, and how far a front is from its carcass [m];
 by eye."""
@@ -36,10 +38,16 @@ def read(reading: Reading) -> Form | str:
     if isinstance(leaves, str):
         return leaves
     (x0, x1), (z0, z1) = np.stack([front.low, front.high], axis=1)
+    z1 = min((z for z in _tops(own) if abs(z - z1) < SAME_TOP), default=z1)
     inside = (own.patches.points[:, 0] > x0) & (own.patches.points[:, 0] < x1)
     rear = bounds(own.patches.points[inside, 1], own.patches.areas[inside])[1]
-    if rear - front.level < LEAST_DEPTH or z1 - z0 < LEAST_HEIGHT:
-        return "its depth was not seen" if rear - front.level < LEAST_DEPTH else "its front is too low"
+    if rear - front.level < LEAST_DEPTH:
+        wall = own.wall_behind(np.array([0.5 * (x0 + x1), front.level, 0.5 * (z0 + z1)]))
+        if wall is None or not LEAST_DEPTH < wall - front.level < DEEPEST:
+            return "its depth was not seen, and no wall is behind it"
+        rear = wall
+    if z1 - z0 < LEAST_HEIGHT:
+        return "its front is too low"
     whole = box_piece("cabinet", np.array([x0, front.level, z0]), np.array([x1, rear, z1]))
     if not own.has_room(whole):
         return "cameras saw that it is not full"
@@ -52,7 +60,7 @@ def read(reading: Reading) -> Form | str:
 def _from_the_front(reading: Reading) -> tuple[Reading, Front] | None:
     """Return the reading turned so that the side with most of bars looks to -y, and that side below its top, the lowest
     level place: what is higher stands on it. None where no side has bars."""
-    tops = [z for z, area in levels(reading.patches) if area >= LEAST_TOP and z > reading.base + LEAST_HEIGHT]
+    tops = _tops(reading)
     best: tuple[float, Reading, Front] | None = None
     for quarter in range(4):
         turn = transform_from_yaw(0.5 * np.pi * quarter, np.zeros(3))[:3, :3]
@@ -63,6 +71,11 @@ def _from_the_front(reading: Reading) -> tuple[Reading, Front] | None:
         if front is not None and length > (0.0 if best is None else best[0]):
             best = (length, turned, front)
     return None if best is None else best[1:]
+
+
+def _tops(reading: Reading) -> list[float]:
+    """Return the heights of level places that may be its top [m]."""
+    return [z for z, area in levels(reading.patches) if area >= LEAST_TOP and z > reading.base + LEAST_HEIGHT]
 
 
 def _boards(low: np.ndarray, high: np.ndarray) -> list[Piece]:

@@ -56,7 +56,8 @@ def surface_to_read(around: Surroundings, mesh: EntityMesh) -> Reading:
     boxes = [around.graph.node(link.target).box for link in links]
     carrying = tuple(bottom(child) for child in boxes if child is not None)
     height, own = support_height_of(around.node), cKDTree(mesh.vertices)
-    return Reading(patches, height, np.eye(3), around.free_space, own, carrying, around.hangs)
+    walls = tuple(plane for wall in around.walls for plane in wall.planes if not plane.horizontal)
+    return Reading(patches, height, np.eye(3), around.free_space, own, carrying, around.hangs, walls)
 
 
 def fit(family: str, reading: Reading, within: float = NEAR) -> Fitted | str:

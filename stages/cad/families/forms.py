@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scenewright.schemas.scene_parts import SurfacePlane
 from scenewright.stages.cad.carcasses import Patches
 from scenewright.stages.cad.completion import inside_points
 from scenewright.stages.cad.explained import distances
@@ -25,6 +26,8 @@ UNSURE = 0.02
 """Where space that was seen empty ends is known to this [m]: a voxel of a map."""
 INFERRED_WORDS = "; inferred: "
 """Between what was seen of a form and what was not, in words."""
+FACES = 0.9
+"""A wall faces a thing from this cosine on."""
 SPACING, COARSE = 0.02, 0.05
 """Distance of the points at which a piece, and the room below a top, is held against seen space [m]: a voxel of a map
 for what may be thin."""
@@ -118,10 +121,21 @@ class Reading:
     """Heights at which things stand on it or in it [m]."""
     hangs: bool = False
     """Whether it stands on nothing: on a wall."""
+    walls: tuple[SurfacePlane, ...] = ()
+    """Upright planes of the room's walls, world frame."""
 
     def turned(self, turn: np.ndarray) -> Reading:
         """Return it in another frame: `turn` (3, 3), world from that frame."""
         return replace(self, patches=self.patches.turned(self.turn.T @ turn), turn=turn)
+
+    def wall_behind(self, point: np.ndarray) -> float | None:
+        """Return y of the wall that faces -y behind a point (3,), frame of the thing [m]; None without one."""
+        found = []
+        for wall in self.walls:
+            normal, there = np.asarray(wall.normal), self.turn @ point
+            if normal @ self.turn[:, 1] < -FACES:
+                found.append(point[1] - (normal @ there + wall.offset) / (normal @ self.turn[:, 1]))
+        return min((float(y) for y in found if y > point[1]), default=None)
 
     def filled(self, corners: np.ndarray, spacing: float = SPACING) -> float:
         """Return the share of a convex piece, corners (N, 3), that lies in space that was seen empty, by points at most
