@@ -23,17 +23,25 @@ FEWEST = 1000
 """Vertices of walls that tell the light."""
 LEAST, MOST = 0.5, 2.0
 """Between these a gain is believed."""
+WHITE, BRIGHT = 0.9, 95
+"""Hardly anything reflects more than this: no gain makes this percentile of all surface brighter."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Of linear red, green and blue (IEC 61966-2-1)."""
 
 
-def gain_by_walls(colors: np.ndarray) -> float:
+def gain_by_walls(walls: np.ndarray, everything: np.ndarray) -> float:
     """Return by how much linear light is to be multiplied so that walls reflect what walls do; 1 where too few were
-    seen. `colors` (N, 3) uint8 sRGB of the vertices of all walls."""
-    if len(colors) < FEWEST:
+    seen. `walls` (N, 3), `everything` (M, 3): uint8 sRGB of the vertices of walls, and of all of the map."""
+    if len(walls) < FEWEST:
         return 1.0
-    seen = float(np.percentile(srgb_to_linear(colors / 255.0) @ LUMINANCE, LIT))
-    return round(float(np.clip(REFLECTED / max(seen, 1e-6), LEAST, MOST)), 3)
+    gain = float(np.clip(REFLECTED / max(np.percentile(luminance(walls), LIT), 1e-6), LEAST, MOST))
+    whitest = WHITE / max(float(np.percentile(luminance(everything), BRIGHT)), 1e-6)
+    return round(min(gain, max(whitest, 1.0)), 3)
+
+
+def luminance(colors: np.ndarray) -> np.ndarray:
+    """Return the linear luminance (N,) of colours (N, 3) uint8 sRGB: 0 to 1."""
+    return np.asarray(srgb_to_linear(colors / 255.0) @ LUMINANCE)
 
 
 def relit(colors: np.ndarray, gain: float) -> np.ndarray:

@@ -299,11 +299,10 @@ def move_meshes(arranged: Arrangement, folder: Path) -> None:
 
 def gain_of_light(graph: ContactGraphFile, panoptic_map: PanopticMap) -> float:
     """Return by how much linear light is multiplied so that walls reflect what walls do."""
-    files = [
-        panoptic_map.path(node.mesh) for node in graph.nodes if node.class_name == "wall" and node.mesh is not None
-    ]
-    colors = [load_entity_mesh(file).colors for file in files]
-    return gain_by_walls(np.concatenate([np.zeros((0, 3), np.uint8), *colors]))
+    none = np.zeros((0, 3), np.uint8)
+    seen = [(node, load_entity_mesh(panoptic_map.path(node.mesh)).colors) for node in graph.nodes if node.mesh]
+    walls = [colors for node, colors in seen if node.class_name == "wall"]
+    return gain_by_walls(np.concatenate([none, *walls]), np.concatenate([none, *(colors for _, colors in seen)]))
 
 
 def colors_of_parts(
