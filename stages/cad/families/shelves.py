@@ -10,6 +10,8 @@ from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 FEWEST, ALIKE = 2, 0.4
 """A shelf has so many boards, of this share of the largest one's area: things hide what they stand on."""
+TELLING = 3
+"""From so many boards on, all seen from above or below, one has seen into it: a closed thing shows its top alone."""
 NARROWEST, LOWEST = 0.2, 0.6
 """A shelf that stands is at least so wide and so high [m]."""
 AT_THE_REAR, BACK, LEAST_BACK = 0.06, 0.015, 0.3
@@ -34,6 +36,8 @@ def read(reading: Reading) -> Form | str:
         return "it is smaller than a shelf"
     low, high = ends[:, 0], ends[:, 1]
     low[2] = own.base
+    if len(heights) < TELLING and not own.seen_into(low, high):
+        return "nobody saw into it"
     boards = []
     for z in heights:
         board = box_piece("board", np.array([*low[:2], z - THICK]), np.array([*high[:2], z]), carries=True)
