@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from scenewright.stages.cad.families.forms import Form, Leaf, Piece, Reading, box_piece
