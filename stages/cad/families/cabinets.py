@@ -122,7 +122,7 @@ def _leaf(number: int, leaf: FrontLeaf, level: float, rear: float) -> Leaf:
         origin = np.array([side, level + FRONT, middle[2]])
         axis, travel = np.array([0.0, 0.0, 1.0 if leaf.hinge_right else -1.0]), SWING
     kind = "drawer" if leaf.slides else "door"
-    joint_type = "prismatic" if leaf.slides else "revolute"
+    joint_type: Literal["revolute", "prismatic"] = "prismatic" if leaf.slides else "revolute"
     return Leaf(
         f"{kind}_{number}", joint_type, tuple(pieces), origin, axis, travel, handle, np.eye(3)[along], leaf.seen
     )
