@@ -20,7 +20,7 @@ from scenewright.stages.kit.geometry.steadiness import stands_steadily
 from scipy.spatial import cKDTree
 
 FAMILIES: Mapping[str, tuple[tuple[str, ...], Callable[[Reading], Form | str]]] = {
-    "cabinet": (("cabinet", "wall_cabinet", "drawer_unit", "wardrobe"), cabinets.read),
+    "cabinet": (("cabinet", "wall_cabinet", "drawer_unit", "wardrobe", "fridge"), cabinets.read),
     "chair": (("chair",), chairs.read),
     "shelf": (("shelf", "wall_shelf"), shelves.read),
     "sofa": (("sofa", "bed"), sofas.read),

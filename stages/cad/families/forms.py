@@ -11,10 +11,11 @@ import numpy as np
 from scenewright.schemas.scene_parts import SurfacePlane
 from scenewright.stages.cad.carcasses import Patches
 from scenewright.stages.cad.completion import inside_points
-from scenewright.stages.cad.explained import distances
+from scenewright.stages.cad.explained import NEAR, distances
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.kit.geometry.solids import Solid, hull_or_box
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 MOST_FILLED = 0.2
 """Share of a piece that was seen that may lie in space seen to be empty, as posts are some voxels wide; of
@@ -66,6 +67,20 @@ class Leaf:
     """(3,) unit, along its bar."""
     seen: bool = True
     """Whether its bar was."""
+    value: float = 0.0
+    """As it stands [rad] or [m]."""
+
+    @property
+    def standing(self) -> tuple[Piece, ...]:
+        """Its pieces as it stands."""
+        if self.value == 0.0:
+            return self.pieces
+        if self.type == "prismatic":
+            return tuple(replace(piece, corners=piece.corners + self.value * self.axis) for piece in self.pieces)
+        turn = Rotation.from_rotvec(self.value * self.axis).as_matrix()
+        return tuple(
+            replace(piece, corners=(piece.corners - self.origin) @ turn.T + self.origin) for piece in self.pieces
+        )
 
 
 @dataclass(frozen=True)
@@ -82,13 +97,18 @@ class Form:
 
     @cached_property
     def solids(self) -> list[Solid]:
-        """Its pieces and those of its leaves as polyhedra, frame of the thing."""
-        pieces = [*self.pieces, *(piece for leaf in self.leaves for piece in leaf.pieces)]
+        """Its pieces and those of its leaves, as they stand, as polyhedra, frame of the thing."""
+        pieces = [*self.pieces, *(piece for leaf in self.leaves for piece in leaf.standing)]
         return [hull_or_box(piece.corners) for piece in pieces]
 
     def distance(self, patches: Patches) -> np.ndarray:
         """Return how far patches of surface, frame of the thing, are from it (N,) [m]."""
         return distances(patches.points, [(solid.vertices, solid.faces) for solid in self.solids])
+
+    def explains(self, reading: Reading) -> float:
+        """Return how much of a surface lies near it [m²]."""
+        patches = reading.turned(self.turn).patches
+        return float(patches.areas[self.distance(patches) < NEAR].sum())
 
     @property
     def words(self) -> str:

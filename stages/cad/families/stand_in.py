@@ -181,7 +181,8 @@ def _solids(pieces: Sequence[Piece], origin: np.ndarray) -> list[Solid]:
 
 def write_form(node: GraphNode, form: Form, folder: Path) -> tuple[Placement, ModelSurface]:
     """Write the model of a form and return where it stands, and its surface."""
-    corners = np.concatenate([solid.vertices for solid in form.solids])
+    shut = [*form.pieces, *(piece for leaf in form.leaves for piece in leaf.pieces)]
+    corners = np.concatenate([piece.corners for piece in shut])
     low, high = corners.min(axis=0), corners.max(axis=0)
     origin = np.array([*(0.5 * (low + high))[:2], low[2]])
     solids = _solids(form.pieces, origin)
@@ -224,5 +225,7 @@ def write_form(node: GraphNode, form: Form, folder: Path) -> tuple[Placement, Mo
         recipe={FAMILY: form.family, "pieces": form.words, INFERRED: " ".join(map(str, form.inferred))},
     )
     write_model_folder(folder, model, [body, *parts])
-    placement = Placement(shape_of_state(model, state), 1.0, form.turn, form.turn @ origin, 0.0, 0.0, 0.0)
+    values = {joint.name: leaf.value for joint, leaf in zip(joints, form.leaves, strict=True)}
+    shape = shape_of_state(model, state.model_copy(update={"joints": values}))
+    placement = Placement(shape, 1.0, form.turn, form.turn @ origin, 0.0, 0.0, 0.0)
     return placement, load_surface(folder, model)
