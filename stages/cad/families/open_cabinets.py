@@ -73,7 +73,8 @@ class Opened:
 
 def read(reading: Reading) -> Form | str:
     """Return the open cabinet that a surface shows, or why there is none."""
-    reasons, forms = [], list[Form]()
+    reasons: list[str] = []
+    forms: list[Form] = []
     for yaw in product(_yaws(reading.patches), 0.5 * np.pi * np.arange(4)):
         turned = reading.turned(reading.turn @ transform_from_yaw(sum(yaw), np.zeros(3))[:3, :3])
         found = opened(turned.patches, turned.base)
@@ -200,34 +201,21 @@ def _is_inside(z: float, patches: Patches, low: np.ndarray, high: np.ndarray) ->
 
 
 def _form(found: Opened, reading: Reading) -> Form:
-    low, high = found.low, found.high
-    z0, z1 = found.door
-    if z0 - low[2] < LEAST_REST:
-        z0 = low[2]
-    if high[2] - z1 < LEAST_REST:
-        z1 = high[2]
-    pieces: list[Piece] = boards(low, high, found.walls)
-    for z in found.shelves:
-        ends = (
-            np.array([low[0] + found.walls.left, low[1] + 2 * BOARD, z - BOARD]),
-            np.array([high[0] - found.walls.right, high[1] - found.walls.back, z]),
-        )
-        pieces.append(box_piece("board", *ends, carries=True))
+    """Return the form of an open cabinet: its carcass with boards, its door, and what shuts the rest of its front."""
+    low, high, walls = found.low, found.high, found.walls
+    z0 = found.door[0] if found.door[0] - low[2] >= LEAST_REST else low[2]
+    z1 = found.door[1] if high[2] - found.door[1] >= LEAST_REST else high[2]
+
+    def board(top: float, recess: float, *, seen: bool) -> Piece:
+        ends = (low[0] + walls.left, low[1] + recess, top - BOARD), (high[0] - walls.right, high[1] - walls.back, top)
+        return box_piece("board", np.array(ends[0]), np.array(ends[1]), seen=seen, carries=seen)
+
+    pieces = [*boards(low, high, walls), *(board(z, 2 * BOARD, seen=True) for z in found.shelves)]
     leaves = [_open_leaf(found, z0, z1)]
-    for name, bottom, top in (("below", low[2], z0), ("above", z1, high[2])):
-        if top - bottom >= LEAST_REST:
+    for bottom, top, divider in ((low[2], z0, z0), (z1, high[2], z1 + BOARD)):
+        if top > bottom:
             fixed, more = _rest(reading, low, high, bottom, top, len(leaves))
-            pieces += [
-                *fixed,
-                box_piece(
-                    "board",
-                    np.array([low[0] + found.walls.left, low[1], z0 - BOARD if name == "below" else z1]),
-                    np.array(
-                        [high[0] - found.walls.right, high[1] - found.walls.back, z0 if name == "below" else z1 + BOARD]
-                    ),
-                    seen=False,
-                ),
-            ]
+            pieces += [*fixed, board(divider, 0.0, seen=False)]
             leaves += more
     kept = tuple(piece for piece in pieces if piece.seen or reading.has_room(piece))
     return Form("cabinet", _classes(high - low), kept, reading.turn, tuple(leaves))
