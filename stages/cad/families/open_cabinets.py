@@ -248,6 +248,7 @@ def _open_leaf(found: Opened, z0: float, z1: float) -> Leaf:
         max(found.angle, 0.5 * math.pi),
         np.array([free, low[1], 0.5 * (z0 + z1)]),
         np.array([0.0, 0.0, 1.0]),
+        seen=False,
         value=found.angle,
     )
 
