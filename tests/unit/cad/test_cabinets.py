@@ -241,7 +241,7 @@ def test_a_stack_of_drawers_has_its_edges_back(heights, side_by_side):
     assert sum(float(np.prod(leaf.high - leaf.low)) for leaf in leaves) == pytest.approx(edges[-1])
     assert all(np.all(leaf.low < leaf.bar.middle) and np.all(leaf.bar.middle < leaf.high) for leaf in leaves)
     if len(set(heights)) == 1:
-        assert {round(float(leaf.high[1] - leaf.low[1]), 6) for leaf in leaves} == {round(heights[0], 6)}
+        assert [leaf.high[1] - leaf.low[1] for leaf in leaves] == pytest.approx([heights[0]] * len(leaves))
 
 
 def test_what_leaks_onto_a_cabinet_is_no_part_of_it():
