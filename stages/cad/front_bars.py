@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.stages.cad.carcasses import ACROSS, Patches, flat_places
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scenewright.stages.kit.geometry.point_clouds import linked
 
 LEVELS, MOST_HEIGHT, NOISES = (0.008, 0.01, 0.014, 0.02, 0.03), 0.10, 3.0
 """Heights over a front above which bars are looked for, one after the other, and below which they end [m]; a level
@@ -145,20 +143,11 @@ def _at_level(
 ) -> Iterator[tuple[np.ndarray, Bar]]:
     """Yield the bars that lie, or stand, in the rows `high` of what stands out, each with its rows."""
     reach = np.array([ACROSS_BAR, ALONG] if standing else [ALONG, ACROSS_BAR])
-    for joined in _joined(places[high], reach):
-        rows = high[joined]
+    for group in linked(places[high] / reach, np.inf):
+        rows = high[group]
+        if len(rows) < FEWEST:
+            continue
         first, last = np.percentile(places[rows], ENDS, axis=0)
         length, width = (last - first)[::-1] if standing else last - first
         if length >= max(SHORTEST, ELONGATED * width) and width <= WIDEST:
             yield rows, Bar(first, last, float(np.percentile(heights[rows], ENDS[1])), standing)
-
-
-def _joined(places: np.ndarray, reach: np.ndarray) -> list[np.ndarray]:
-    """Return the rows of places (N, 2) that hang together by steps of no more than `reach` (2,), `FEWEST` at least."""
-    if len(places) < FEWEST:
-        return []
-    pairs = cKDTree(places / reach).query_pairs(1.0, p=np.inf, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(places),) * 2)
-    number = connected_components(graph, directed=False)[1]
-    groups = (np.flatnonzero(number == each) for each in range(number.max() + 1))
-    return [rows for rows in groups if len(rows) >= FEWEST]

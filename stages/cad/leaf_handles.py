@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scenewright.stages.cad.leaves import Leaf, Seen
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scenewright.stages.kit.geometry.point_clouds import linked
 
 LEAST_HEIGHT, MOST_HEIGHT, NOISES = 0.015, 0.10, 4.0
 """A handle stands out by as much [m], and by so many times the noise of the front."""
@@ -30,12 +28,9 @@ def handle_height(leaf: Leaf, seen: Seen) -> float | None:
     points = np.column_stack([seen.places[out], seen.heights[out]])
     if len(points) < FEWEST:
         return None
-    pairs = cKDTree(points).query_pairs(APART, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    part = connected_components(graph, directed=False)[1]
     heights = [
         float(cluster[:, 2].max())
-        for cluster in (points[part == number] for number in np.unique(part))
+        for cluster in (points[rows] for rows in linked(points / APART))
         if len(cluster) >= FEWEST
         and np.ptp(cluster[:, :2], axis=0).min() < NARROW
         and _graspable(leaf, cluster[:, :2].mean(axis=0))

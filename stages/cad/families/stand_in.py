@@ -170,7 +170,7 @@ def inferred_of(placement: Placement, surface: ModelSurface) -> Inferred | None:
     pieces = [to_world(placement, np.asarray(surface.pieces[BODY][number].vertices)) for number in numbers]
     return Inferred(
         what=str(surface.model.recipe["pieces"]).partition(INFERRED_WORDS)[2],
-        because="their partners were seen, or what they carry was, and nobody saw that nothing is there",
+        because="things of its family have them beside what was seen of it, and nobody saw that nothing is there",
         pieces=tuple(tuple(as_vector(np.round(corner, 4)) for corner in piece) for piece in pieces),
     )
 

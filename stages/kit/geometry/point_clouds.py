@@ -118,6 +118,17 @@ def clusters(points: np.ndarray, distance: float) -> np.ndarray:
     return rank[label]
 
 
+def linked(points: np.ndarray, norm: float = 2.0) -> list[np.ndarray]:
+    """Return the rows of each group of points (N, D) that hang together by steps of length 1 at most: exact single
+    linkage, for few points. `norm`: p of the lengths; infinity bounds each axis apart."""
+    if len(points) == 0:
+        return []
+    pairs = cKDTree(points).query_pairs(1.0, p=norm, output_type="ndarray")
+    links = coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    number = connected_components(links, directed=False)[1]
+    return [np.flatnonzero(number == each) for each in range(number.max() + 1)]
+
+
 def without_strays(points: np.ndarray, share: float, distance: float) -> np.ndarray:
     """Return (N,) bool: which points (N, 3) are no stray clusters.
 
