@@ -18,9 +18,6 @@ def ask(
     question: Annotated[str, typer.Argument(help='"where can I put the cup?", "red mug on the desk", ...')] = "",
     what: Annotated[bool, typer.Option("--what", help="List what can be asked for.")] = False,
     robot: Annotated[str, typer.Option(help="Robot that has to get to places: of data/robots/, or a TOML file.")] = "",
-    sentences: Annotated[
-        Path | None, typer.Option(help="Folder of a sentence encoder; without it that of an installed package.")
-    ] = None,
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> int:
@@ -30,18 +27,14 @@ def ask(
     from scenewright.stages.engine.reading import open_artifact
     from scenewright.stages.kit.open_words.reading.meaning import Meanings
     from scenewright.stages.kit.open_words.reading.phrase import read_phrase
-    from scenewright.stages.kit.open_words.reading.sentences import SentenceEncoder, installed_sentences
 
     phrase = None if what else read_phrase(question)
     asked = AskedScene(open_artifact(scene))
-    folder = sentences or installed_sentences()
-    meanings = Meanings(SentenceEncoder(folder) if folder is not None else None)
+    meanings = Meanings()
     if phrase is None:
         lines = can_be_asked(asked, meanings)
         out(json.dumps({"scene": str(scene), "can_be_asked": lines}) if json_output else "\n".join(lines))
         return 0
-    if folder is None:
-        say("without a sentence encoder, words outside vocabulary and WordNet are unknown: docs/SPLATS.md")
     told = answer(asked, phrase, meanings, robot)
     if json_output:
         out(json.dumps({"scene": str(scene), "question": question, **vars(told)}, sort_keys=True))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from pydantic import Field
@@ -22,7 +21,6 @@ from scenewright.stages.kit.open_words.opening import open_encoder
 from scenewright.stages.kit.open_words.options import EncoderParameters
 from scenewright.stages.kit.open_words.reading.matching import is_layout
 from scenewright.stages.kit.open_words.reading.meaning import Meanings
-from scenewright.stages.kit.open_words.reading.sentences import SentenceEncoder, installed_sentences
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.splat import recall_at_rejection
 from scenewright.stages.splat.asked_figures import REJECTED
@@ -40,7 +38,6 @@ class RelationParameters(Parameters):
 
     rooms: int = Field(8, ge=1, le=8, description="So many of the rooms")
     frames: int = Field(24, ge=8, description="Frames of a room")
-    sentences: Path | None = Field(None, description="Folder of a sentence encoder; else that of an installed package")
 
 
 @dataclass(frozen=True)
@@ -93,11 +90,9 @@ def first_right(room: AskedRoom, finder: Finder, places: Sequence[Found], right:
 
 def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, RoomTold]]:
     """Ask a room."""
-    given = bench.parameters
-    folder = given.sentences or installed_sentences()
-    meanings = Meanings(SentenceEncoder(folder) if folder is not None else None)
+    meanings = Meanings()
     for trial in trials:
-        room = AskedRoom(bench.out / CASE, trial.seed, 0, given.frames)
+        room = AskedRoom(bench.out / CASE, trial.seed, 0, bench.parameters.frames)
         finder = finder_of(room, meanings)
         firsts = [[first_of(room, finder, query) for query in queries] for queries in room.queries]
         graph = opened(ContactGraph, made("graph", room.folder / "graph", "--panoptic-map", room.map)).info
@@ -165,7 +160,6 @@ EXPERIMENT = Experiment(
         ),
     },
     parameters=RelationParameters,
-    places=frozenset({"sentences"}),
     quick={"rooms": 2},
     steps=(*STEPS, "segment", "fuse", "graph", "splat label"),
 )

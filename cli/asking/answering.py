@@ -84,8 +84,6 @@ def _thing(scene: AskedScene, each: AskedThing, match: Match) -> dict[str, Any]:
     if match.name and names.is_doubtful():
         seen = f" in {names.looks:.0f} images" if names.looks else ""
         doubt = f"rests on one doubtful name: {match.name} ({names.shares[match.name]:.2f}{seen})"
-    elif match.meaning.layer == "sentences":
-        doubt = f"rests on likeness of words alone: {match.name}"
     return {
         "name": each.name,
         "probability": round(match.probability, 3),

@@ -8,7 +8,6 @@ import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
 from scenewright.schemas.panoptic_map import PanopticMap
-from scenewright.schemas.scene_parts import Box
 from scenewright.schemas.sequence import Sequence
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
@@ -19,8 +18,7 @@ from scenewright.stages.kit.open_words.opening import open_encoder
 from scenewright.stages.kit.open_words.reading.evidence import colors_of, names_of_map
 from scenewright.stages.kit.open_words.vectors import of_regions, write_vectors
 from scenewright.stages.kit.stage import Context
-from scenewright.stages.splat.language.classifier import CropClassifier, with_classifier
-from scenewright.stages.splat.language.looks import Sight, crops_of, looks, sight_of
+from scenewright.stages.splat.language.looks import looks, sight_of
 from scenewright.stages.splat.parameters import LabelParameters
 from scenewright.stages.splat.views import evenly, posed_frames
 
@@ -30,8 +28,6 @@ def run(
     sequence: Sequence,
     trajectory: Trajectory | None,
     weights: Path | None,
-    classifier: Path | None,
-    classifier_labels: Path | None,
     *,
     parameters: LabelParameters,
     context: Context,
@@ -58,9 +54,6 @@ def run(
     with context.progress.step("look"):
         vectors, counts = looks(meshes, sights, encoder)
         boxes = [minimum_box(np.asarray(points)) for points in meshes]
-        shares = [dict(names[entity.instance].shares) for entity in entities]
-        if classifier is not None and classifier_labels is not None:
-            shares = _heard(CropClassifier(classifier, classifier_labels), shares, boxes, meshes, sights)
     write_vectors(context.output, of_regions(vectors))
     info = LanguageMapFile(
         source="panoptic_map",
@@ -76,30 +69,14 @@ def run(
                 class_name=entity.class_name,
                 box=box,
                 looks=int(count),
-                names=of_entity,
+                names=dict(names[entity.instance].shares),
                 seen=names[entity.instance].looks,
                 said=names[entity.instance].said,
                 colors=colors_of(mesh.colors),
             )
-            for entity, box, mesh, count, of_entity in zip(entities, boxes, loaded, counts, shares, strict=True)
+            for entity, box, mesh, count in zip(entities, boxes, loaded, counts, strict=True)
         ),
     )
     info.write(context.output / "language.json")
     summary = {"entities": len(entities), "seen": int(np.count_nonzero(counts)), "pictures": len(sights)}
     return LanguageMap(context.output, outcome="ok" if entities else "empty", summary=summary)
-
-
-def _heard(
-    classifier: CropClassifier,
-    shares: list[dict[str, float]],
-    boxes: list[Box],
-    meshes: list[np.ndarray],
-    sights: list[Sight],
-) -> list[dict[str, float]]:
-    """Return the names of entities with what a classifier says of their crops."""
-    crops = crops_of(meshes, sights, classifier.side)
-    scores = np.split(classifier.scores(crops.pictures), np.cumsum(crops.counts)[:-1]) if shares else []
-    return [
-        with_classifier(of_entity, rows, classifier.labels, max(box.size))
-        for of_entity, rows, box in zip(shares, scores, boxes, strict=True)
-    ]

@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 from pydantic import Field
 from scenewright.schemas.contact_graph import ContactGraph
-from scenewright.schemas.errors import UsageError
 from scenewright.schemas.evaluation import Evaluation
 from scenewright.schemas.language_map import Answers, LanguageMap
 from scenewright.schemas.panoptic_map import PanopticMap
@@ -16,12 +15,9 @@ from scenewright.schemas.splat import Splat, SplatViews
 from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.open_words.encoder import checked_text
 from scenewright.stages.kit.open_words.options import EXTRAS, READING_FILES, WEIGHTS, EncoderParameters, encoder_files
-from scenewright.stages.kit.stage import External, Extra, Optionally, Parameters, Stage
+from scenewright.stages.kit.stage import External, Optionally, Parameters, Stage
 
 QUERIES = External("queries.toml: texts that are true of something there, with its boxes, and texts that are not")
-CLASSIFIER = External("classifier of images (.tflite) for what no mask names", weights=True)
-CLASSIFIER_LABELS = External("its labels: CSV, a row a class in the order of its outputs, the name last")
-LITERT = Extra("ai-edge-litert", "ai_edge_litert", "--classifier: pip install ai-edge-litert (make extras)")
 LIBRARIES = ("numpy", "numba", "scipy", "opencv-python-headless", "pillow")
 
 
@@ -91,12 +87,6 @@ def check_query(parameters: QueryParameters, inputs: Mapping[str, Any]) -> None:
     checked_text(parameters.text)
 
 
-def check_classifier(parameters: LabelParameters, inputs: Mapping[str, Any]) -> None:
-    """Raise UsageError for a classifier without labels, or labels without a classifier."""
-    if (inputs.get("classifier") is None) != (inputs.get("classifier_labels") is None):
-        raise UsageError("--classifier and --classifier-labels go together", hint="give both, or neither")
-
-
 def word_files(parameters: EncoderParameters) -> tuple[str, ...]:
     """Return the files of data/ that pictures and words are held against each other with."""
     return (*encoder_files(parameters), *READING_FILES, "words/calibration.toml")
@@ -139,20 +129,12 @@ LABEL = Stage(
     name="splat label",
     summary="Keep what images show of every entity of a panoptic map, so that words find it",
     parameters=LabelParameters,
-    reads={
-        "panoptic_map": PanopticMap,
-        "sequence": Sequence,
-        "trajectory": Optionally(Trajectory),
-        "weights": WEIGHTS,
-        "classifier": Optionally(CLASSIFIER),
-        "classifier_labels": Optionally(CLASSIFIER_LABELS),
-    },
+    reads={"panoptic_map": PanopticMap, "sequence": Sequence, "trajectory": Optionally(Trajectory), "weights": WEIGHTS},
     writes=LanguageMap,
-    libraries=("numpy", "opencv-python-headless", "trimesh", "torch", "ai-edge-litert"),
+    libraries=("numpy", "opencv-python-headless", "trimesh", "torch"),
     module="label_stage",
-    extras=(*EXTRAS, LITERT),
+    extras=EXTRAS,
     data_files=word_files,
-    check=check_classifier,
     example="scenewright splat label --panoptic-map outputs/demo/panoptic_map --sequence outputs/demo/sequence "
     "--out outputs/labels",
 )

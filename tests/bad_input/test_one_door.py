@@ -145,7 +145,6 @@ WITHOUT_THE_DOOR: dict[str, dict[str, str]] = {
     "stages/kit/open_words/reading/nouns.py": {"open": OURS},
     "stages/kit/open_words/embedded.py": {"json.loads": PARSED},
     "stages/splat/asked_file.py": {"model_validate_json": PARSED},
-    "stages/splat/language/classifier.py": {"csv.reader": PARSED},
     "stages/splat/checkpoints.py": {"json.loads": PARSED},
     "stages/splat/triangulation.py": {"open": MADE},
     "stages/suture/segmentation/checkpoint.py": {"json.loads": PARSED},

@@ -4,9 +4,11 @@ Phrases were drawn beforehand (drawing.py). `thesis` asks the language field of 
 the size that fits best in the image that shows a right thing best, and always answers with one Gaussian. In
 `thesis_witnesses` every Gaussian has instead of vectors what the same masks say of it in the images that show it, and
 nouns are read as in ours; it always answers too. `ours_splat` asks pieces of that splat by the names of the entities
-that they belong to, without crops. `entities` asks what images show of every entity of the map, by the
-encoder. `ours` asks the same entities by names with probabilities, colours, sizes and the contact graph. `ours_masks`
-does without the classifier of crops, `ours_nouns` without the sentence encoder too, `ours_classes` without WordNet too.
+that they belong to. `entities` asks what images show of every entity of the map, by the encoder. `ours` asks the same
+entities by names with probabilities, colours, sizes and the contact graph; `ours_classes` does without WordNet.
+
+Two bounds stand beside `ours`: how many things the map has an entity of, and how many are among the places of a phrase
+at all, whatever their order and threshold. No order of the same names finds more than the second.
 
 The thresholds from which a place counts as an answer come from generated rooms on which probabilities were fitted
 (`threshold`): there nine of ten absent phrases are rejected. In the first column, as for generated rooms, nine of ten
@@ -30,7 +32,6 @@ from scenewright.stages.kit.open_words.finding import Finder, heard
 from scenewright.stages.kit.open_words.opening import open_encoder
 from scenewright.stages.kit.open_words.options import EncoderParameters
 from scenewright.stages.kit.open_words.reading.meaning import Meanings
-from scenewright.stages.kit.open_words.reading.sentences import SentenceEncoder, installed_sentences
 from scenewright.stages.kit.stage import Parameters
 from scenewright.stages.splat import recall_at_rejection
 
@@ -53,7 +54,6 @@ class PhotographsParameters(Parameters):
 
     data: Path = Field(Path("../shared/data"), description="Folder with the real logs and networks of others")
     steps: int = Field(200, ge=1, description="Steps of training the field")
-    sentences: Path | None = Field(None, description="Folder of a sentence encoder; else that of an installed package")
     threshold: float = Field(0.042, ge=0, le=1, description="Probability from which on ours answers (words_relations)")
 
 
@@ -78,6 +78,10 @@ class Told:
     """It lies in the picture's box of a right thing, in the held-out image that shows one best; None: there is none."""
     precise: bool
     """It is at a thing of which the phrase is, or may be, true."""
+    mapped: bool | None
+    """Some entity of the map is at a right thing; None of an arm that asks no entities."""
+    among: bool
+    """Some place of its answer is at a right thing."""
     milliseconds: float
 
 
@@ -119,13 +123,13 @@ def measure(bench: Bench, trials: Sequence[Trial]) -> Iterator[tuple[Trial, Told
         ask = way_of(room, arm, given)
         for trial in (each for each in trials if each.arm == arm):
             phrase, present = phrases[int(trial.seed.rsplit("-", 1)[1])]
-            yield trial, told(room, phrase, present, ask, 0.0 if arm in ALWAYS else given.threshold)
+            yield trial, told(room, phrase, present, ask, arm, 0.0 if arm in ALWAYS else given.threshold)
 
 
 def told(
-    room: AskedPhotographs, asked: Asked, present: bool, ask: Callable[[Query], list[Place]], least: float
+    room: AskedPhotographs, asked: Asked, present: bool, ask: Callable[[Query], list[Place]], arm: str, least: float
 ) -> Told:
-    """Ask one phrase and judge its first place."""
+    """Ask one phrase and judge its first place, which is an answer where it is as likely as `least`."""
     right = tuple(room.number[name] for name in asked.right)
     query, maybe = Query(asked.text, right), tuple(room.number[name] for name in asked.maybe)
     began = time.process_time()
@@ -146,6 +150,8 @@ def told(
         overlaps=first is not None and first.overlaps,
         pictured=None if room.best_view(query) is None or first is None else room.within_picture(first.point, query),
         precise=first is not None and room.at(first.point, replace(query, right=right + maybe)),
+        mapped=None if arm in ALWAYS else any(room.at(place, query) for place in room.entity_places),
+        among=any(place.probability > 0 and room.at(place.point, query) for place in places),
         milliseconds=spent,
     )
 
@@ -158,20 +164,12 @@ def way_of(room: AskedPhotographs, arm: str, given: PhotographsParameters) -> Ca
         way: AlwaysAnswering = ThesisWay(room, finder, finder.vectors.vectors)
         return way.find
     if arm == "thesis_witnesses":
-        return WitnessWay(room, layers(arm, given)).find
-    labels = {"ours": "labels_with_crops", "ours_splat": "language"}.get(arm, "labels")
-    finder = Finder(getattr(room, labels), encoder, meanings=layers(arm, given))
+        return WitnessWay(room, Meanings()).find
+    labels = room.language if arm == "ours_splat" else room.labels
+    finder = Finder(labels, encoder, meanings=Meanings(with_nouns=arm != "ours_classes"))
     if arm == "entities":
         finder.has_names = False
     return lambda query: entity_places(room, finder, query, related=arm != "entities")
-
-
-def layers(arm: str, given: PhotographsParameters) -> Meanings:
-    """Return the layers of words of an arm."""
-    folder = given.sentences or installed_sentences()
-    with_sentences = arm in ("ours", "ours_splat", "ours_masks", "thesis_witnesses") and folder is not None
-    encoder = SentenceEncoder(folder) if with_sentences and folder is not None else None
-    return Meanings(encoder, with_nouns=arm != "ours_classes")
 
 
 def entity_places(room: AskedPhotographs, finder: Finder, query: Query, related: bool) -> list[Place]:
@@ -255,8 +253,6 @@ EXPERIMENT = Experiment(
     arms={
         "ours": "ours",
         "ours_splat": "ours, pieces of the splat",
-        "ours_masks": "ours, without a classifier of crops",
-        "ours_nouns": "ours, vocabulary and WordNet alone",
         "ours_classes": "ours, vocabulary alone",
         "entities": "entities by looks",
         "thesis_witnesses": "thesis's way, same networks",
@@ -275,6 +271,8 @@ EXPERIMENT = Experiment(
         "first_right": share(lambda told: told.at),
         "pictured": share(lambda told: told.pictured and told.answered if told.pictured is not None else None),
         "precision": share(lambda told: told.precise, lambda told: told.answered),
+        "mapped": share(lambda told: told.mapped),
+        "among": share(lambda told: told.among),
         "rejected": share(lambda told: not told.answered, lambda told: not told.present),
         "query_ms": Measure(lambda records: float(np.median([r.milliseconds for r in records])), "ms", False),
     },
@@ -295,7 +293,7 @@ EXPERIMENT = Experiment(
     compared=("found_at_rejection", "first_right"),
     more_figures=differences,
     parameters=PhotographsParameters,
-    places=frozenset({"data", "sentences"}),
+    places=frozenset({"data"}),
     inputs=lambda bench, trial: [
         LIST,
         ANNOTATIONS / f"{log_of(trial.seed)}.json",

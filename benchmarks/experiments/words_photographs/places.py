@@ -31,8 +31,6 @@ NETWORKS = (
     "segmenters/yolov8n_seg_640_int8.tflite",
 )
 """Files of the data folder: YOLOX nano, DeepLab of PASCAL VOC and of ADE20K, YOLOv8n-seg."""
-CLASSIFIER = ("networks/mobilenet_v2_1.0_224_imagenet_uint8.tflite", "networks/imagenet_labels_wnid.csv")
-"""MobileNetV2 of ImageNet, asked about crops, and its labels."""
 BEHIND = (0.05, 0.02)
 """A Gaussian is seen when it lies no farther behind the measured depth than this [m], and this share of it."""
 NEAR = 0.02
@@ -66,17 +64,13 @@ class AskedPhotographs(AskedLog):
     @cached_property
     def labels(self) -> LanguageMap:
         """Entities of the map, by looks and names."""
-        return self._labels("labels")
+        given = ("--panoptic-map", self.map, "--sequence", self.sequence.root, "--most-views", self.most_views)
+        return opened(LanguageMap, made("splat label", self.folder / "labels", *given))
 
     @cached_property
-    def labels_with_crops(self) -> LanguageMap:
-        """The same with a classifier of crops heard, for what no mask names."""
-        paths = [self.data / name for name in CLASSIFIER]
-        return self._labels("labels_with_crops", "--classifier", paths[0], "--classifier-labels", paths[1])
-
-    def _labels(self, name: str, *further: object) -> LanguageMap:
-        given = ("--panoptic-map", self.map, "--sequence", self.sequence.root, "--most-views", self.most_views)
-        return opened(LanguageMap, made("splat label", self.folder / name, *given, *further))
+    def entity_places(self) -> list[np.ndarray]:
+        """Middles (3,) of the boxes of the map's entities [m]."""
+        return [np.array(region.box.center) for region in self.labels.info.regions]
 
     @cached_property
     def truth(self) -> TrueRoom:

@@ -63,46 +63,27 @@ class _Kept:
             del self.scores[worst], self.crops[worst]
 
 
-@dataclass(frozen=True)
-class Crops:
-    """Squares about regions where they are seen best."""
-
-    pictures: np.ndarray
-    """(K, side, side, 3) uint8."""
-    scores: np.ndarray
-    """(K,): how large and whole each shows its region."""
-    counts: np.ndarray
-    """(R,) squares of each region, which come one region after the other."""
-
-
-def crops_of(regions: Sequence[np.ndarray], sights: Iterable[Sight], side: int) -> Crops:
-    """Return the best squares of regions, points (P, 3) [m, world] each, brought to `side` [px]."""
-    thinned = [points[:: -(-len(points) // MOST_POINTS)] if len(points) > MOST_POINTS else points for points in regions]
-    owner = np.repeat(np.arange(len(regions)), [len(points) for points in thinned])
-    points = np.concatenate(thinned) if thinned else np.zeros((0, 3))
-    sizes = np.bincount(owner, minlength=len(regions))
-    looks_of_region = [_Kept() for _ in regions]
-    for sight in sights:
-        _look(sight, points, owner, sizes, looks_of_region, side)
-    pictures = [crop for each in looks_of_region for crop in each.crops]
-    return Crops(
-        np.stack(pictures) if pictures else np.zeros((0, side, side, 3), np.uint8),
-        np.array([score for each in looks_of_region for score in each.scores]),
-        np.array([len(each.crops) for each in looks_of_region], int),
-    )
-
-
 def looks(regions: Sequence[np.ndarray], sights: Iterable[Sight], encoder: Encoder) -> tuple[np.ndarray, np.ndarray]:
     """Return (R, width) unit vectors of regions, points (P, 3) [m, world] each, and (R,) how many looks each had.
 
     A region that no picture shows has zeros.
     """
-    crops = crops_of(regions, sights, encoder.side)
+    thinned = [points[:: -(-len(points) // MOST_POINTS)] if len(points) > MOST_POINTS else points for points in regions]
+    owner = np.repeat(np.arange(len(regions)), [len(points) for points in thinned])
+    points = np.concatenate(thinned) if thinned else np.zeros((0, 3))
+    sizes = np.bincount(owner, minlength=len(regions))
+    kept = [_Kept() for _ in regions]
+    for sight in sights:
+        _look(sight, points, owner, sizes, kept, encoder.side)
+    counts = np.array([len(each.crops) for each in kept], int)
     vectors = np.zeros((len(regions), encoder.width), np.float32)
-    if len(crops.pictures):
-        owners = np.repeat(np.arange(len(regions)), crops.counts)
-        np.add.at(vectors, owners, encoder.pictures(crops.pictures) * np.sqrt(crops.scores)[:, None])
-    return unit(vectors), crops.counts
+    if counts.any():
+        crops = np.stack([crop for each in kept for crop in each.crops])
+        scores = np.array([score for each in kept for score in each.scores])
+        np.add.at(
+            vectors, np.repeat(np.arange(len(regions)), counts), encoder.pictures(crops) * np.sqrt(scores)[:, None]
+        )
+    return unit(vectors), counts
 
 
 def _look(sight: Sight, points: np.ndarray, owner: np.ndarray, sizes: np.ndarray, kept: list[_Kept], side: int) -> None:

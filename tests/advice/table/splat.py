@@ -95,12 +95,6 @@ ROWS = [
         "ask {fridge}/map 'where can I put the cup?'",
         "graph --panoptic-map {fridge}/map --out graph && ask graph 'where can I put the cup?'",
     ),
-    Tried(
-        "stages/splat/parameters.py",
-        "give both, or neither",
-        f"{LABEL} --classifier-labels {{fridge}}/map/entities.json",
-        LABEL,
-    ),
     NotTried(QUERY_STAGE, "another --encoder", "another encoder has to be downloaded"),
     NotTried(BUILD_STAGE, "--method ours", "no pictures are known from which a method keeps no Gaussian"),
     NotTried(

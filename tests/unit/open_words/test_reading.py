@@ -151,15 +151,6 @@ def test_relations_of_nouns(noun: str, name: str, relation: str) -> None:
     assert relation_of(table, noun, name) == relation
 
 
-class Alike:
-    """Sentence vectors of which all but one pair are alike."""
-
-    label = "alike"
-
-    def texts(self, texts: tuple[str, ...]) -> np.ndarray:
-        return np.array([[1.0, 0.0] if text in ("gizmowatt", "remote") else [0.0, 1.0] for text in texts])
-
-
 def test_layers_speak_one_after_the_other() -> None:
     fit = calibration()
     bare, full = Meanings(with_nouns=False), Meanings()
@@ -172,10 +163,6 @@ def test_layers_speak_one_after_the_other() -> None:
     assert bare.of(("furniture",), ("chair",))[0].probability == 0.0
     assert full.of(("cup",), ("object",))[0].probability == 0.0
     assert not full.knows("gizmowatt")
-    heard = Meanings(Alike())  # type: ignore[arg-type]
-    assert heard.knows("gizmowatt")
-    likely, unlike = heard.of(("gizmowatt",), ("remote", "chair"))
-    assert likely.layer == "sentences" and unlike.probability < 0.01 < likely.probability <= fit.most < fit.synonym
 
 
 def test_names_are_the_posteriors_of_the_map() -> None:

@@ -1,4 +1,4 @@
-"""How likely a thing with a name is what a noun means, by layers: our vocabulary, WordNet, and a sentence encoder.
+"""How likely a thing with a name is what a noun means, by two layers: our vocabulary, and WordNet.
 
 Each layer is asked of what the one before leaves open, and has probabilities of its own, fitted on the nouns of our
 lexicon (data/words/meanings.toml; `python -m benchmarks.words.meanings`). No layer was fitted on what is reported on.
@@ -12,14 +12,12 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.outside import file_toml
 from scenewright.schemas.places import REINSTALL, data_file
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.kit.open_words.reading.names import class_named, senses_named
 from scenewright.stages.kit.open_words.reading.nouns import Nouns, anchors, nouns
-from scenewright.stages.kit.open_words.reading.sentences import SentenceEncoder
 
 FILE = "words/meanings.toml"
 """File below data/."""
@@ -37,11 +35,6 @@ class Calibration:
     """... where the noun is a synonym of the class by our tables."""
     relations: Mapping[str, float]
     """Relation by WordNet -> that probability."""
-    bias: float
-    slope: float
-    """Of the logistic function of the cosine by the sentence encoder, where WordNet says none or distant kinship."""
-    most: float
-    """No more than this, whatever the cosine: a wider doubt."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +43,7 @@ class Meaning:
 
     probability: float
     layer: str
-    """`vocabulary`, `wordnet`, `sentences`; "" where no layer says anything."""
+    """`vocabulary`, `wordnet`; "" where no layer says anything."""
     how: str
     """Relation of noun and name, in a word."""
 
@@ -68,26 +61,21 @@ def calibration(path: Path | None = None) -> Calibration:
             float(row["vocabulary"]["named"]),
             float(row["vocabulary"]["synonym"]),
             {name: float(value) for name, value in row["wordnet"].items()},
-            float(row["sentences"]["bias"]),
-            float(row["sentences"]["slope"]),
-            float(row["sentences"]["most"]),
         )
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise BadInput(f"{file}: no calibration of meanings ({error})", hint=REINSTALL) from None
 
 
 class Meanings:
-    """The layers that are there. `sentences`: None without that layer; `with_nouns` False leaves WordNet out."""
+    """The layers that are there; `with_nouns` False leaves WordNet out."""
 
-    def __init__(self, sentences: SentenceEncoder | None = None, with_nouns: bool = True) -> None:
-        self._sentences = sentences
+    def __init__(self, with_nouns: bool = True) -> None:
         self._table = nouns() if with_nouns else None
         self._fit = calibration()
 
     def layers(self) -> tuple[str, ...]:
         """Return the names of the layers that are there."""
-        there = (("vocabulary", True), ("WordNet", self._table), ("sentences", self._sentences))
-        return tuple(name for name, each in there if each)
+        return ("vocabulary", "WordNet") if self._table else ("vocabulary",)
 
     def of(self, asked: Iterable[str], names: Sequence[str]) -> list[Meaning]:
         """Return per name (a class, or a label of a network) how likely it is what one of the nouns `asked` means."""
@@ -99,7 +87,7 @@ class Meanings:
 
     def knows(self, noun: str) -> bool:
         """Whether any layer has something to say about a noun."""
-        return bool(class_named(noun) or (self._table and senses_named(noun)) or self._sentences)
+        return bool(class_named(noun) or (self._table and senses_named(noun)))
 
     def _of(self, noun: str, name: str) -> Meaning:
         fit, own = self._fit, class_named(noun)
@@ -115,13 +103,6 @@ class Meanings:
             at_least = fit.relations["kind"] if relation == "kind" else fit.synonym
             return Meaning(at_least, "vocabulary", "a kind of it" if relation == "kind" else "a synonym")
         by_nouns = fit.relations[relation] if self._table is not None and relation != "none" else 0.0
-        if relation in ("same", "kind", "broader") or self._sentences is None or own:
-            return Meaning(by_nouns, "wordnet" if by_nouns else "", _HOW[relation])
-        rows = self._sentences.texts((noun, written))
-        cosine = float(rows[0] @ rows[1])
-        by_sentences = min(fit.most, 1.0 / (1.0 + float(np.exp(-(fit.bias + fit.slope * cosine)))))
-        if by_sentences > by_nouns:
-            return Meaning(by_sentences, "sentences", "said alike")
         return Meaning(by_nouns, "wordnet" if by_nouns else "", _HOW[relation])
 
 
