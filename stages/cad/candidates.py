@@ -8,6 +8,7 @@ import numpy as np
 from scenewright.schemas.cad_library import CadModel
 from scenewright.schemas.cad_scene import Tried
 from scenewright.schemas.contact_graph import GraphNode
+from scenewright.schemas.scene_parts import Relation
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.method import CadMethod
 from scenewright.stages.cad.shapes import Placement, Shape
@@ -35,6 +36,8 @@ class Shortlist:
     """Why there is no valid candidate, or in what the valid ones fall short."""
     tries: tuple[Tried, ...] = ()
     """In which ways something was sought, in order, and what came of it."""
+    carrier: Relation | None = None
+    """On what its model of a family stands, where nothing was known to carry it."""
 
 
 def models_for(class_name: str, models: tuple[CadModel, ...]) -> list[CadModel]:

@@ -16,7 +16,9 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.schemas.vocabulary import UNNAMED, load_vocabulary
 from scenewright.stages.cad.candidates import Shortlist, shortlist
+from scenewright.stages.cad.made_models import is_of_family
 from scenewright.stages.cad.method import CadMethod
+from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.stretching import source_of
 from scenewright.stages.cad.target import Target
 
@@ -63,6 +65,18 @@ def renamed(graph: ContactGraphFile, shortlists: Mapping[str, Shortlist]) -> Con
     """Return the graph in which things have the class that shape gave them."""
     nodes = (shortlists[node.id].node if node.id in shortlists else node for node in graph.nodes)
     return graph.model_copy(update={"nodes": tuple(nodes)})
+
+
+def with_carriers(
+    graph: ContactGraphFile, shortlists: Mapping[str, Shortlist], chosen: Mapping[str, Placement]
+) -> ContactGraphFile:
+    """Return the graph in which what floated stands on what its model of a family reaches down to, where that is
+    `chosen`."""
+    carriers = {
+        name: shortlists[name].carrier for name, placement in chosen.items() if is_of_family(placement.shape.model)
+    }
+    links = (carriers.get(link.target) or link if link.relation == "unknown" else link for link in graph.links)
+    return graph.model_copy(update={"links": tuple(links)})
 
 
 def by_class(target: Target, models: Iterable[CadModel], method: CadMethod) -> list[Shortlist]:

@@ -33,7 +33,7 @@ from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.obstacles import floor_levels, obstacles_of
 from scenewright.stages.cad.ours import Ours
 from scenewright.stages.cad.parameters import CadParameters
-from scenewright.stages.cad.recognition import named_by_people, renamed
+from scenewright.stages.cad.recognition import named_by_people, renamed, with_carriers
 from scenewright.stages.cad.records import cad_graph, scene_file
 from scenewright.stages.cad.room_light import gain_by_walls, relight, relit
 from scenewright.stages.cad.scene_explanation import explanation_of
@@ -92,7 +92,9 @@ def choose_and_write(
 ) -> CadScene:
     """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4). `moved`: what the log
     shows in two states."""
-    graph = renamed(graph, shortlists)
+    as_seen = renamed(graph, shortlists)
+    first = {name: entry.placements[0] for name, entry in shortlists.items() if entry.placements}
+    graph = with_carriers(as_seen, shortlists, first)
     free_space = method.free_space(panoptic_map)
     with context.progress.step("shell"):
         shell = write_shell(graph, panoptic_map, free_space, context) if method.closes_the_room else None
@@ -103,11 +105,13 @@ def choose_and_write(
             chosen = {name: placement for name, placement in chosen.items() if name not in yielding}
             shortlists = {name: yielded(entry) if name in yielding else entry for name, entry in shortlists.items()}
             obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
+        graph = with_carriers(as_seen, shortlists, chosen)
         levels = floor_levels(graph, context.output / "layout")
         arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         while off := unexplaining(graph, panoptic_map, arranged, chosen, surfaces, method.least_explained):
             chosen = {name: placement for name, placement in chosen.items() if name not in off}
             shortlists |= {name: given_back(shortlists[name], why) for name, why in off.items()}
+            graph = with_carriers(as_seen, shortlists, chosen)
             obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
             arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         move_meshes(arranged, context.output / "meshes")

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scenewright.schemas.cad_library import CadModel
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
+from scenewright.schemas.scene_parts import Relation
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
 from scenewright.stages.cad.parameters import CadParameters
-from scenewright.stages.cad.placing import placed_planes, supporting_surface, wall_depth
+from scenewright.stages.cad.placing import placed_planes, supporting_surface, wall_depth, within
 from scenewright.stages.cad.shapes import Observed, Placement, observed_frames
 from scenewright.stages.kit.geometry.boxes import bottom
 
@@ -34,6 +36,35 @@ class Surroundings:
         """Whether it stands on nothing: on a wall, from the ceiling."""
         link = self.graph.parent_link(self.node.id)
         return link is not None and link.relation in ("carries_on_wall", "hangs_from")
+
+    @property
+    def floats(self) -> bool:
+        """Whether nothing is known to carry it: part of it is missing."""
+        link = self.graph.parent_link(self.node.id)
+        return link is not None and link.relation == "unknown"
+
+    @cached_property
+    def surface_below(self) -> Relation | None:
+        """The relation by which what floats would stand on the nearest level surface below its middle, None without."""
+        if not self.floats or self.node.box is None:
+            return None
+        middle, height = np.asarray(self.node.box.center), bottom(self.node.box)
+        gaps = [
+            (height - plane.center[2], other.id, k)
+            for other in self.graph.nodes
+            for k, plane in enumerate(other.planes)
+            if other.id != self.node.id and plane.horizontal and plane.center[2] <= height and within(plane, middle)
+        ]
+        if not gaps:
+            return None
+        gap, name, k = min(gaps)
+        return Relation(source=name, target=self.node.id, relation="supports", confidence=0.5, plane=k, gap=gap)
+
+    @property
+    def stands_at(self) -> float:
+        """Height of what it stands on, or of the nearest level surface below what floats [m]."""
+        height = support_height_of(self.node)
+        return height if self.surface_below is None else height - (self.surface_below.gap or 0.0)
 
 
 @dataclass(frozen=True)

@@ -91,6 +91,8 @@ def _by_shape(entry: Shortlist, thing: Thing, method: CadMethod) -> tuple[Shortl
         return entry, "somebody gave it its name"
     if not is_doubtful(entry, method):
         return entry, "a model of its class fits it"
+    if thing.target.around.floats:
+        return entry, "nothing is known to carry it, so that part of its shape is missing"
     alike = [model for model in thing.library.info.models if might_be(model, thing.target)]
     load_surfaces(thing.library, alike, thing.target.surfaces)
     renamed = recognised(entry, thing.target, alike, method)

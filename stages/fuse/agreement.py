@@ -12,14 +12,15 @@ import numpy as np
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
 from scenewright.stages.fuse.belief import doubted, flush_shares
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from scenewright.stages.fuse.joining import joined
+from scenewright.stages.fuse.feet import feet_of
+from scenewright.stages.fuse.joining import joined, root, wholes
 from scenewright.stages.fuse.layout.evidence import Scene
 from scenewright.stages.fuse.layout.room import CEILING, FLOOR, WALL, Layout, find_layout
 from scenewright.stages.fuse.looks import Looks
 from scenewright.stages.fuse.pieces import Cloud, grown_things, pieces_beside
 from scenewright.stages.fuse.relabelling import relabelled
 from scenewright.stages.fuse.surface import Surface
-from scenewright.stages.fuse.testimony import BOUND, GROWN, JOINED, PIECE, Reason, with_names
+from scenewright.stages.fuse.testimony import BOUND, FOOTED, GROWN, JOINED, PIECE, Reason, with_names
 from scenewright.stages.fuse.votes import Votes
 
 SURE = 0.5
@@ -89,12 +90,16 @@ def agreed(
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
     points = looks.on(scene.vertices, labels.instance)
     may_join = frozenset(entity.instance for entity in kept if entity.class_id in things)
-    parts = joined(scene, labels.instance, may_join, points, voxel)
+    home = joined(scene, labels.instance, may_join, points, voxel)
+    nameless = frozenset(entity.instance for entity in kept if entity.class_id == unnamed)
+    feet = feet_of(scene, wholes(labels.instance, home)[labels.instance], may_join, nameless, voxel)
+    home |= feet
+    parts = {k: root(home, k) for k in home}
     if parts:
-        whole = np.array([parts.get(k, k) for k in range(int(labels.instance.max(initial=0)) + 1)], np.int32)
+        whole = wholes(labels.instance, parts)
         kept, labels = relabelled(surface, kept, labels, whole[labels.instance], {})
         points = [(mask, whole[thing]) for mask, thing in points]
-        shapes |= dict.fromkeys(parts.values(), JOINED)
+        shapes |= dict.fromkeys(parts.values(), JOINED) | {parts[foot]: FOOTED for foot in feet}
     named, labels, reasons = with_names(kept, labels, shapes, looks.said_of(points), vocabulary, things)
     return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
 

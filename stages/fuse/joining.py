@@ -8,7 +8,7 @@ along.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from scenewright.stages.fuse.layout.evidence import Scene
@@ -91,13 +91,19 @@ def joined(
             continue
         if stands_on(first, second, up_second, voxel) or stands_on(second, first, up_first, voxel):
             continue
-        kept, gone = sorted((_root(home, k) for k in pair), key=lambda k: (-size[k], k))
+        kept, gone = sorted((root(home, k) for k in pair), key=lambda k: (-size[k], k))
         if kept != gone:
             home[gone] = kept
-    return {k: _root(home, k) for k in home}
+    return {k: root(home, k) for k in home}
 
 
-def _root(home: dict[int, int], k: int) -> int:
+def wholes(instance: np.ndarray, parts: Mapping[int, int]) -> np.ndarray:
+    """Return (N + 1,) int32 per instance, up to the largest N of instances (V,), the thing that it is of."""
+    return np.array([parts.get(k, k) for k in range(int(instance.max(initial=0)) + 1)], np.int32)
+
+
+def root(home: Mapping[int, int], k: int) -> int:
+    """Return the thing of which a part of a part is one; `home`: part -> thing, without circles."""
     while k in home:
         k = home[k]
     return k

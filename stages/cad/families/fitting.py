@@ -9,10 +9,10 @@ import numpy as np
 from scenewright.stages.cad.built_ins import EXPLAINED
 from scenewright.stages.cad.carcasses import Patches, patches_of
 from scenewright.stages.cad.explained import NEAR
-from scenewright.stages.cad.families import cabinets, chairs, shelves, sofas, tables
+from scenewright.stages.cad.families import cabinets, chairs, lamps, shelves, sofas, tables
 from scenewright.stages.cad.families.forms import Form, Reading
 from scenewright.stages.cad.families.reading import further_pieces
-from scenewright.stages.cad.target import Surroundings, support_height_of
+from scenewright.stages.cad.target import Surroundings
 from scenewright.stages.kit.formats.entity_meshes import EntityMesh
 from scenewright.stages.kit.formats.mobility import BUILT_IN, STANDS
 from scenewright.stages.kit.geometry.boxes import bottom, points_in_box
@@ -22,6 +22,7 @@ from scipy.spatial import cKDTree
 FAMILIES: Mapping[str, tuple[tuple[str, ...], Callable[[Reading], Form | str]]] = {
     "cabinet": (("cabinet", "wall_cabinet", "drawer_unit", "wardrobe", "fridge"), cabinets.read),
     "chair": (("chair",), chairs.read),
+    "lamp": (("lamp",), lamps.read),
     "shelf": (("shelf", "wall_shelf"), shelves.read),
     "sofa": (("sofa", "bed"), sofas.read),
     "table": (("table", "desk", "bench", "stool"), tables.read),
@@ -55,9 +56,10 @@ def surface_to_read(around: Surroundings, mesh: EntityMesh) -> Reading:
     links = [link for link in around.graph.links if link.source == around.node.id and link.relation in STANDS]
     boxes = [around.graph.node(link.target).box for link in links]
     carrying = tuple(bottom(child) for child in boxes if child is not None)
-    height, own = support_height_of(around.node), cKDTree(mesh.vertices)
+    height, own = around.stands_at, cKDTree(mesh.vertices)
     walls = tuple(plane for wall in around.walls for plane in wall.planes if not plane.horizontal)
-    return Reading(patches, height, np.eye(3), around.free_space, own, carrying, around.hangs, walls)
+    name = around.node.class_name
+    return Reading(patches, height, np.eye(3), around.free_space, own, carrying, around.hangs, walls, name)
 
 
 def fit(family: str, reading: Reading, within: float = NEAR) -> Fitted | str:

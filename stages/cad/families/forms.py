@@ -143,6 +143,8 @@ class Reading:
     """Whether it stands on nothing: on a wall."""
     walls: tuple[SurfacePlane, ...] = ()
     """Upright planes of the room's walls, world frame."""
+    class_name: str = ""
+    """What masks named it."""
 
     def turned(self, turn: np.ndarray) -> Reading:
         """Return it in another frame: `turn` (3, 3), world from that frame."""

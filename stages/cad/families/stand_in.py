@@ -100,7 +100,8 @@ def of_family(
         cost = min(cost, entry.placements[0].score)
     placement = replace(placement, alignment_error=rms(surface, placement, target), score=cost)
     reason = f"a {best.form.family} of {best.form.words}; {best.explained:.0%} explained"
-    return replace(entry, node=renamed, placements=(placement, *entry.placements), reason=reason)
+    placements = (placement, *entry.placements)
+    return replace(entry, node=renamed, placements=placements, reason=reason, carrier=target.around.surface_below)
 
 
 def likeliest(found: Sequence[Fitted], class_name: str, said: Mapping[str, float], reading: Reading) -> Fitted:
