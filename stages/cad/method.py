@@ -36,28 +36,14 @@ class CadMethod(Protocol):
         ...
 
     @property
-    def keeps_surroundings(self) -> bool:
-        """Whether what the map shows and nothing has a name for becomes a part of the scene."""
+    def corrects(self) -> bool:
+        """Whether what the thesis leaves out counts: nameless surface, a closed shell, the room's light, and grounds on
+        which a joint is believed."""
         ...
 
     @property
     def ways(self) -> tuple[Way, ...]:
         """The ways in which something is sought that may stand for a thing, in order (`tries.SEEKERS`)."""
-        ...
-
-    @property
-    def asks_grounds(self) -> bool:
-        """Whether joints of a model that nothing in the map speaks for are held."""
-        ...
-
-    @property
-    def closes_the_room(self) -> bool:
-        """Whether floor, walls and ceiling become closed plates, where the map tells a layout."""
-        ...
-
-    @property
-    def takes_light_out(self) -> bool:
-        """Whether the room's light is taken out of colours, by its walls."""
         ...
 
     @property

@@ -57,9 +57,9 @@ class Ours:
     parameters: CadParameters
 
     @property
-    def keeps_surroundings(self) -> bool:
-        """As the options say."""
-        return self.parameters.surroundings
+    def corrects(self) -> bool:
+        """All of it."""
+        return True
 
     @property
     def ways(self) -> tuple[Way, ...]:
@@ -72,21 +72,6 @@ class Ours:
             "built_in": self.parameters.built_ins,
         }
         return tuple(way for way, is_asked in asked.items() if is_asked)
-
-    @property
-    def asks_grounds(self) -> bool:
-        """A class name says what such things can do, not that this one does."""
-        return True
-
-    @property
-    def closes_the_room(self) -> bool:
-        """As the options say."""
-        return self.parameters.shell
-
-    @property
-    def takes_light_out(self) -> bool:
-        """A simulator puts light on colours anew."""
-        return True
 
     @property
     def least_explained(self) -> float:

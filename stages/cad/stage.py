@@ -95,9 +95,9 @@ def choose_and_write(
     as_seen = renamed(graph, shortlists)
     first = {name: entry.placements[0] for name, entry in shortlists.items() if entry.placements}
     graph = with_carriers(as_seen, shortlists, first)
-    free_space = method.free_space(panoptic_map)
+    free_space, corrects = method.free_space(panoptic_map), method.corrects
     with context.progress.step("shell"):
-        shell = write_shell(graph, panoptic_map, free_space, context) if method.closes_the_room else None
+        shell = write_shell(graph, panoptic_map, free_space, context) if corrects and method.parameters.shell else None
     with context.progress.step("global check"):
         chosen, selection = select(graph, shortlists, surfaces, method, context.random(CONFLICTS))
         obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
@@ -125,7 +125,7 @@ def choose_and_write(
     standing |= {name: placed_pieces(p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items()}
     with context.progress.step("complete what would not stand"):
         inferred = completed(final, context.output / "meshes", standing, levels, arranged.shifts, free_space)
-    if method.keeps_surroundings:
+    if corrects and method.parameters.surroundings:
         with context.progress.step("surroundings"):
             pieces = [piece for some in standing.values() for piece in some]
             pieces += [footing(standing[name]) for name in arranged.placements]
@@ -135,7 +135,7 @@ def choose_and_write(
     with context.progress.step("writing"):
         if nameless is not None:
             write_surface(nameless, context.output / "meshes" / f"{SURROUNDINGS}.ply")
-        gain = gain_of_light(graph, panoptic_map) if method.takes_light_out else 1.0
+        gain = gain_of_light(graph, panoptic_map) if corrects else 1.0
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map, gain)
         evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
         explanation = explanation_of(graph, panoptic_map, arranged, shortlists, surfaces, context.output)
@@ -350,7 +350,7 @@ def grounds_of_joints(
     evidence = {}
     for name, placement in arranged.placements.items():
         node = graph.node(name)
-        if node.mesh is None or not placement.shape.model.joints or not method.asks_grounds:
+        if node.mesh is None or not placement.shape.model.joints or not method.corrects:
             continue
         mesh = load_entity_mesh(panoptic_map.path(node.mesh))
         looked = Looked(mesh.vertices, vertex_normals(mesh.vertices, mesh.faces), mesh.colors)

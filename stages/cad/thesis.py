@@ -28,29 +28,14 @@ class Thesis:
     parameters: CadParameters
 
     @property
-    def keeps_surroundings(self) -> bool:
-        """Only what has a node is in the scene."""
+    def corrects(self) -> bool:
+        """Nothing of it: what has a node is there as it was mapped, and what a model can do, the thing can."""
         return False
 
     @property
     def ways(self) -> tuple[Way, ...]:
         """It takes the class from the masks, and the library's models at one scale (2.10)."""
         return ("library",)
-
-    @property
-    def asks_grounds(self) -> bool:
-        """What the model can do, the thing can."""
-        return False
-
-    @property
-    def closes_the_room(self) -> bool:
-        """Layout stays as it was mapped."""
-        return False
-
-    @property
-    def takes_light_out(self) -> bool:
-        """Colours stay as cameras saw them."""
-        return False
 
     @property
     def least_explained(self) -> float:
