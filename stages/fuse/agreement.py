@@ -92,7 +92,8 @@ def agreed(
     may_join = frozenset(entity.instance for entity in kept if entity.class_id in things)
     home = joined(scene, labels.instance, may_join, points, voxel)
     nameless = frozenset(entity.instance for entity in kept if entity.class_id == unnamed)
-    feet = feet_of(scene, wholes(labels.instance, home)[labels.instance], may_join, nameless, voxel)
+    wall = next(number for number, kind in bounds.items() if kind == WALL)
+    feet = feet_of(scene, wholes(labels.instance, home)[labels.instance], may_join, nameless, wall, voxel)
     home |= feet
     parts = {k: root(home, k) for k in home}
     if parts:

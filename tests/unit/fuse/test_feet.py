@@ -29,15 +29,22 @@ def test_what_floats_stands_on_what_is_narrow_below_its_middle(
     boxes: tuple[Corners, ...], expected: dict[int, int]
 ) -> None:
     scene, instance = room(*boxes)
-    assert feet_of(scene, instance, {1, 2}, {2}, VOXEL) == expected
-    assert feet_of(scene, instance, {1, 2}, (), VOXEL) == {}, "what has a name is no foot"
-    assert feet_of(scene, instance, {2}, {2}, VOXEL) == {}, "what is no thing has none"
+    assert feet_of(scene, instance, {1, 2}, {2}, 4, VOXEL) == expected
+    assert feet_of(scene, instance, {1, 2}, (), 4, VOXEL) == {}, "what has a name is no foot"
+    assert feet_of(scene, instance, {2}, {2}, 4, VOXEL) == {}, "what is no thing has none"
+
+
+@pytest.mark.parametrize(("distance", "expected"), [(0.05, {}), (0.2, {2: 1})])
+def test_a_wall_may_carry_what_is_beside_it(distance: float, expected: dict[int, int]) -> None:
+    far = 0.12 + distance
+    scene, instance = room(SHADE, FOOT, ((far, -1.0, 0.0), (far + 0.04, 1.0, 1.0)))
+    assert feet_of(scene, instance, {1, 2}, {2}, 3, VOXEL) == expected
 
 
 def test_a_foot_has_a_foot_and_all_are_one() -> None:
     stem = ((-0.06, -0.06, 0.22), (0.06, 0.06, 0.34))
     scene, instance = room(SHADE, stem, ((-0.03, -0.03, 0.0), (0.03, 0.03, 0.16)))
-    feet = feet_of(scene, instance, {1, 2, 3}, {2, 3}, VOXEL)
+    feet = feet_of(scene, instance, {1, 2, 3}, {2, 3}, 4, VOXEL)
     assert feet == {2: 1, 3: 2}
     parts = {k: root(feet, k) for k in feet}
     assert parts == {2: 1, 3: 1}
