@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.stages.kit.formats.scene_supports import support_height
+from scenewright.stages.kit.geometry.boxes import box_volume
+from scenewright.stages.kit.geometry.substances import substance_of
 
 STANDS = ("supports", "contains")
 BUILT_IN = frozenset(
@@ -41,6 +43,8 @@ BUILT_IN = frozenset(
 )
 """Part of the building, fastened to it, or too heavy to be pushed."""
 NAMELESS = "object"
+HEAVIEST = 400.0
+"""What has no name and weighs more by its box is not pushed [kg]: a kitchenette in one piece; by eye."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,12 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
         return Mobility(False, why=f"class {node.class_name} is among the classes to keep fixed")
     if node.class_name in BUILT_IN:
         return Mobility(False, why=f"class {node.class_name} is part of the building, or too heavy to push")
+    if node.class_name == NAMELESS and (mass := _mass_of_box(node)) > HEAVIEST:
+        return Mobility(False, why=f"some {mass:.0f} kg by its size, it is part of the building or too heavy to push")
     if support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
         return Mobility(False, why="the graph puts it on no level plane")
     return Mobility(True, furniture=True, why="it is furniture and stands by its own weight")
+
+
+def _mass_of_box(node: GraphNode) -> float:
+    return 0.0 if node.box is None else substance_of(node.class_name).hull_density * box_volume(node.box)

@@ -77,6 +77,7 @@ def graph_with(
         (graph_with("sink"), Mobility(False)),
         (graph_with("cup", gap=0.3), Mobility(True)),
         (graph_with("object"), FREE),
+        (graph_with("object", size=2.6), Mobility(False)),  # a kitchenette in one piece
         (graph_with("sofa", size=1.8), FREE),
         (graph_with("cup", gap=0.3, relation="unknown"), Mobility(False)),
         (graph_with("chair", relation="unknown"), Mobility(False)),
