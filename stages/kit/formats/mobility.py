@@ -82,7 +82,9 @@ def mobility(graph: ContactGraphFile, node: GraphNode, carriable: Collection[str
     if node.class_name in BUILT_IN:
         return Mobility(False, why=f"class {node.class_name} is part of the building, or too heavy to push")
     if node.class_name == NAMELESS and (mass := _mass_of_box(node)) > HEAVIEST:
-        return Mobility(False, why=f"some {mass:.0f} kg by its size, it is part of the building or too heavy to push")
+        return Mobility(
+            False, why=f"it would weigh {mass:.0f} kg by its size: part of the building, or too heavy to push"
+        )
     if support_height(graph, {entry.id: entry for entry in graph.nodes}, node.id) is None:
         return Mobility(False, why="the graph puts it on no level plane")
     return Mobility(True, furniture=True, why="it is furniture and stands by its own weight")
