@@ -69,15 +69,6 @@ def write_results(results: Results, command: Sequence[str], missing: Sequence[Tr
     return text
 
 
-def write_measured(out: Path | None, metrics: Mapping[str, float], text: str) -> None:
-    """Print a measurement's table; write it and metrics.json where there is an output folder."""
-    print(text)
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        _write(out / "metrics.json", metrics)
-        (out / "table.md").write_text(text, encoding="utf-8")
-
-
 def described(results: Results, figures: Mapping[str, Figure], command: Sequence[str]) -> dict[str, Any]:
     """Return figures.json: the figures, and what has to stand beside them."""
     experiment = results.experiment

@@ -19,8 +19,6 @@ GAP = 0.01
 """Between a door and what is around it [m]; by eye."""
 IN_WALL = 0.2
 """A door or window so near to a wall's plane is in the wall, and a hinge so near to it is at the wall [m]."""
-WIDE_OPEN = np.pi / 2
-"""Doors open at least so far [rad]; by eye."""
 PARALLEL = 0.95
 """Cosine of the angle of two planes from which they are along each other; by eye."""
 LEAST_UPRIGHT = 0.3

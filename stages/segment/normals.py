@@ -6,9 +6,7 @@ import math
 
 import numpy as np
 from numba import prange
-from scenewright.schemas.scene_parts import Camera
 from scenewright.stages.kit.compiled import compiled
-from scenewright.stages.kit.geometry.cameras import back_project
 
 # A row is worked on in loops without branches over arrays of their own, which add several pixels at a time; every sum
 # takes its terms in the order of the window, so that how many are added at a time changes no bit.
@@ -195,8 +193,3 @@ def planes_of(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the coordinates of vectors (H, W, 3) as images (H, W) float32 of their own."""
     x, y, z = np.ascontiguousarray(vectors.transpose(2, 0, 1), dtype=np.float32)
     return x, y, z
-
-
-def normals_of_depth(depth: np.ndarray, camera: Camera, *, window: int = 13, step: int = 2) -> np.ndarray:
-    """Return `surface_normals` of a z-depth image (H, W) [m] with 0 invalid."""
-    return surface_normals(back_project(depth, camera), window=window, step=step)

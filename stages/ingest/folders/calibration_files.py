@@ -32,7 +32,6 @@ LARGEST_FILE = 256_000
 """Bytes of a calibration file: its parser is slow, and it holds some dozens of numbers."""
 OPENCV_TAG = re.compile(r"!!opencv-matrix\b")
 KITTI = re.compile(r"^P([0-3]):((?:\s+\S+){12})\s*$", re.MULTILINE)
-MIDDLEBURY_KEYS = ("cam0", "cam1", "doffs", "baseline")
 
 
 @dataclass(frozen=True)

@@ -110,14 +110,6 @@ def loader_of(reads: FrameReads, form: FrameFormat) -> Callable[[], LoadedFrame]
     return load
 
 
-def loaded_color(path: Path | None, recorded: RecordedCamera, camera: Camera, stream: str) -> np.ndarray | bytes:
-    """Return the colour in a file as `camera` sees it: the file's own bytes where they can be kept, else (H, W, 3)
-    uint8 RGB. Raises Unusable, with reasons that name the `stream`."""
-    if path is None:
-        raise Unusable(f"missing_{stream}")
-    return _color(file_bytes(path, stream), recorded, camera, stream, path.name)
-
-
 def _color_and_picture(
     data: bytes | np.ndarray, form: FrameFormat
 ) -> tuple[np.ndarray | bytes, np.ndarray | bytes | None]:

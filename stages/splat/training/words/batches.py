@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from scenewright.stages.kit.open_words.two_towers import SIDE, tokens
-from scenewright.stages.splat.training.words.lexicon import FALSE, TRUE, UNKNOWN, Lexicon, Phrase
+from scenewright.stages.splat.training.words.lexicon import FALSE, TRUE, UNKNOWN, Lexicon
 from scenewright.stages.splat.training.words.samples import RENDERED, Samples
 from scipy.ndimage import find_objects
 
@@ -264,8 +264,3 @@ def truth_of_crops(things: torch.Tensor, crops: Crops, attributes: torch.Tensor)
         others = truth_of_things(things[crops.others[:, column]], attributes)
         truth = torch.where((truth == FALSE) & (others != FALSE), UNKNOWN, truth)
     return torch.where(crops.valid[:, None], truth, UNKNOWN)
-
-
-def phrase_table(phrases: list[Phrase], words: Lexicon, device: str) -> torch.Tensor:
-    """Return the `attribute_table` of phrases."""
-    return attribute_table([phrase.attributes for phrase in phrases], len(words.attributes)).to(device)
