@@ -9,7 +9,7 @@ import numpy as np
 from scenewright.cli.main import run
 from scenewright.stages.kit.formats.frames import FrameWriter
 
-from tests.advice.inputs import fridge, walks
+from tests.advice.inputs import walks
 from tests.advice.rows import NotTried, Tried
 from tests.panoptic_maps import box_mesh, floor_mesh, write_map
 from tests.unit.poses.textured_room import CAMERA, round_walk
@@ -44,8 +44,13 @@ def words_of_another_map(folder: Path) -> None:
     assert run(["splat", "label", *written]) == 0
 
 
-def words_of_the_map(folder: Path) -> None:
-    written = [f"--panoptic-map={fridge()}/map", f"--sequence={walks()}/two", "--out=words"]
+def words_without_names(folder: Path) -> None:
+    (folder / "nameless").mkdir()
+    box = box_mesh((0.2, 0.2, 0.0), (0.8, 0.8, 1.6))
+    things = {11: floor_mesh((-2.0, -2.0), (2.0, 2.0)), 12: box}
+    write_map(folder / "nameless", things, dict.fromkeys(things, "object"))
+    seal(folder / "nameless", "panoptic_map")
+    written = ["--panoptic-map=nameless", f"--sequence={walks()}/two", "--out=words"]
     assert run(["splat", "label", *written]) == 0
 
 
@@ -86,7 +91,7 @@ ROWS = [
         f"{ASK} --language words --text fridge",
         f"{ASK} --language words --text fridge --least-probability 0",
         code=0,
-        given=words_of_the_map,
+        given=words_without_names,
         right=both_shown,
     ),
     Tried(
