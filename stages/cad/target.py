@@ -45,7 +45,8 @@ class Surroundings:
 
     @cached_property
     def surface_below(self) -> Relation | None:
-        """The relation by which what floats would stand on the nearest level surface below its middle, None without."""
+        """The relation by which what floats would stand on the nearest level surface below its middle, None without.
+        Its gap is down from the box [m]; its confidence that of what is inferred."""
         if not self.floats or self.node.box is None:
             return None
         middle, height = np.asarray(self.node.box.center), bottom(self.node.box)
