@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
-from scenewright.stages.fuse.belief import doubted, flush_shares
+from scenewright.stages.fuse.belief import AS_SURE, doubted, flush_shares, usual_score
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from scenewright.stages.fuse.feet import feet_of
 from scenewright.stages.fuse.joining import joined, root, wholes
@@ -23,8 +23,8 @@ from scenewright.stages.fuse.surface import Surface
 from scenewright.stages.fuse.testimony import BOUND, FOOTED, GROWN, JOINED, PIECE, Reason, with_names
 from scenewright.stages.fuse.votes import Votes
 
-SURE = 0.5
-"""Share of looks with a mask of a thing from which on no wall takes its surface: a screen that hangs flat on it."""
+MOST = 0.5
+"""Share of looks from which on masks make a window, door or curtain."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,19 @@ def agreed(
     layout = find_layout(scene)
     told = votes.share(labelled.segment, things)
     own_told = votes.own_share(labelled.segment, labelled.class_id)
-    dropped = _dropped(entities, labelled, told, own_told, scene, things, voxel)
+    seen = [e for e in entities if (labelled.instance == e.instance).any()]
+    flush = flush_shares(scene.vertices, scene.normals, labelled.instance, voxel)
+    mean, own_mean = (_mean_by(labelled.instance, share) for share in (told, own_told))
+    of_things = [e.instance for e in seen if e.class_id in things]
+    usual = usual_score(of_things, mean, flush)
+    sure = AS_SURE * usual  # as of what stands free: a screen that hangs flat on a wall
+    dropped = doubted(of_things, mean, flush, usual)
+    few = {e.instance: own_mean[e.instance] for e in seen if e.class_id not in things and own_mean[e.instance] < MOST}
+    dropped |= {k: f"a window, door or curtain that masks had in few looks: {share:.2f}" for k, share in few.items()}
     instance = np.where(np.isin(labelled.instance, sorted(dropped)), 0, labelled.instance)
 
     is_thing = np.isin(labelled.class_id, sorted(things)) & (instance > 0)
-    bounded = (layout.owner > 0) & ((instance == 0) | (is_thing & (told < SURE)))
+    bounded = (layout.owner > 0) & ((instance == 0) | (is_thing & (told < sure)))
     first = 1 + max([int(labelled.instance.max(initial=0)), *(e.instance for e in entities)])
     bounds = {first + k: kind for k, kind in enumerate((FLOOR, WALL, CEILING))}
     for number, kind in bounds.items():
@@ -76,9 +84,8 @@ def agreed(
         stuff = (instance > 0) & ~(is_thing & ~bounded)
         things_of = np.where(stuff, 0, instance)
         cloud = Cloud(scene.vertices - [0.0, 0.0, layout.floor or 0.0], scene.normals, voxel)
-        size = np.maximum(np.bincount(things_of), 1)
-        sure = np.flatnonzero(np.bincount(things_of, weights=own_told) >= SURE * size)
-        grown = grown_things(cloud, things_of, stuff, frozenset(sure.tolist()), minimum_area)
+        whole_already = np.flatnonzero(_mean_by(things_of, own_told) >= sure)
+        grown = grown_things(cloud, things_of, stuff, frozenset(whole_already.tolist()), minimum_area)
         of_thing = np.where(grown != things_of, 1.0, own_told)
         found = pieces_beside(cloud, grown, stuff, of_thing, minimum_area)
         shapes |= dict.fromkeys(np.unique(grown[grown != things_of]).tolist(), GROWN)
@@ -105,25 +112,6 @@ def agreed(
     return Agreement(named, labels, layout, reasons, tuple(dropped.values()))
 
 
-def _dropped(
-    entities: Sequence[ExtractedEntity],
-    labelled: LabelledSurface,
-    told: np.ndarray,
-    own_told: np.ndarray,
-    scene: Scene,
-    things: frozenset[int],
-    voxel: float,
-) -> dict[int, str]:
-    """Return the instances that masks alone do not make, each with the reason."""
-    size = np.bincount(labelled.instance)
-    mean = np.bincount(labelled.instance, weights=told) / np.maximum(size, 1)
-    own_mean = np.bincount(labelled.instance, weights=own_told) / np.maximum(size, 1)
-    seen = [e for e in entities if e.instance < len(size) and size[e.instance]]
-    flush = flush_shares(scene.vertices, scene.normals, labelled.instance, voxel)
-    of_things = [e.instance for e in seen if e.class_id in things]
-    reasons = doubted(of_things, {k: float(mean[k]) for k in of_things}, flush)
-    for entity in seen:
-        if entity.class_id not in things and own_mean[entity.instance] < SURE:
-            share = own_mean[entity.instance]
-            reasons[entity.instance] = f"a window, door or curtain that masks had in few looks: {share:.2f}"
-    return reasons
+def _mean_by(instance: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return by instance (I + 1,) the mean of what vertices (V,) have; 0 of none."""
+    return np.asarray(np.bincount(instance, weights=share) / np.maximum(np.bincount(instance), 1))

@@ -73,18 +73,18 @@ def _is_flush(point: np.ndarray, normal: np.ndarray, other: np.ndarray, other_no
     return is_near and cosine > FLUSH_COSINE and abs(step) < flat and abs(other_step) < flat
 
 
-def usual_score(things: Sequence[int], told: Mapping[int, float], flush: np.ndarray) -> float:
+def usual_score(things: Sequence[int], told: np.ndarray, flush: np.ndarray) -> float:
     """Return what masks usually say of things that stand free; arguments as in `doubted`."""
     free = [told[k] for k in things if flush[k] < OUTLINE]
     return float(np.median(free)) if free else 0.5
 
 
-def doubted(things: Sequence[int], told: Mapping[int, float], flush: np.ndarray) -> dict[int, str]:
+def doubted(things: Sequence[int], told: np.ndarray, flush: np.ndarray, usual: float) -> dict[int, str]:
     """Return the things whose shape is not believed, each with the reason.
 
-    `told` [by thing]: mean score, 0..1 a look, of masks of things; `flush`: as in `flush_shares`.
+    `told` (I + 1,) [by thing]: mean score, 0..1 a look, of masks of things; `flush`: as in `flush_shares`; `usual`: as
+    in `usual_score`.
     """
-    usual = usual_score(things, told, flush)
     reasons: dict[int, str] = {}
     for k in things:
         if told[k] < WEAK * usual:
