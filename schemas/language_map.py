@@ -19,6 +19,8 @@ class LanguageRegion(Model):
     """Class of that entity."""
     box: Box
     """Of a piece of a thing that a map knows, the thing's."""
+    point: Vector3 | None = Field(default=None, exclude_if=lambda point: point is None)
+    """Of an entity: the point of its surface nearest the median of that [m]; an answer points there."""
     looks: Count
     """Pieces of pictures that its vector is the mean of; 0: no picture shows it, and no word finds it by them."""
     names: dict[str, float] = Field(default_factory=dict, exclude_if=lambda names: not names)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
+from scenewright.stages.fuse.aprons import without_aprons
 from scenewright.stages.fuse.belief import AS_SURE, doubted, flush_shares, usual_score
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from scenewright.stages.fuse.feet import feet_of
@@ -24,7 +25,7 @@ from scenewright.stages.fuse.testimony import BOUND, FOOTED, GROWN, JOINED, PIEC
 from scenewright.stages.fuse.votes import Votes
 
 MOST = 0.5
-"""Share of looks from which on masks make a window, door or curtain."""
+"""Share of looks from which on masks make a window, door or curtain, and have all of a thing."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +66,14 @@ def agreed(
     mean, own_mean = (_mean_by(labelled.instance, share) for share in (told, own_told))
     of_things = [e.instance for e in seen if e.class_id in things]
     usual = usual_score(of_things, mean, flush)
-    sure = AS_SURE * usual  # as of what stands free: a screen that hangs flat on a wall
     dropped = doubted(of_things, mean, flush, usual)
     few = {e.instance: own_mean[e.instance] for e in seen if e.class_id not in things and own_mean[e.instance] < MOST}
     dropped |= {k: f"a window, door or curtain that masks had in few looks: {share:.2f}" for k, share in few.items()}
     instance = np.where(np.isin(labelled.instance, sorted(dropped)), 0, labelled.instance)
 
     is_thing = np.isin(labelled.class_id, sorted(things)) & (instance > 0)
-    bounded = (layout.owner > 0) & ((instance == 0) | (is_thing & (told < sure)))
+    # A screen that hangs flat on a wall is kept by masks as sure of it as of what stands free.
+    bounded = (layout.owner > 0) & ((instance == 0) | (is_thing & (told < AS_SURE * usual)))
     first = 1 + max([int(labelled.instance.max(initial=0)), *(e.instance for e in entities)])
     bounds = {first + k: kind for k, kind in enumerate((FLOOR, WALL, CEILING))}
     for number, kind in bounds.items():
@@ -84,7 +85,7 @@ def agreed(
         stuff = (instance > 0) & ~(is_thing & ~bounded)
         things_of = np.where(stuff, 0, instance)
         cloud = Cloud(scene.vertices - [0.0, 0.0, layout.floor or 0.0], scene.normals, voxel)
-        whole_already = np.flatnonzero(_mean_by(things_of, own_told) >= sure)
+        whole_already = np.flatnonzero(_mean_by(things_of, own_told) >= MOST)
         grown = grown_things(cloud, things_of, stuff, frozenset(whole_already.tolist()), minimum_area)
         of_thing = np.where(grown != things_of, 1.0, own_told)
         found = pieces_beside(cloud, grown, stuff, of_thing, minimum_area)
@@ -94,6 +95,8 @@ def agreed(
         pieces = range(start + 1, start + 1 + int(found.piece.max(initial=0)))
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
+    classes = {entity.instance: entity.class_id for entity in entities} | new_classes
+    instance = without_aprons(scene, instance, [k for k, c in classes.items() if c in things], voxel)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
     points = looks.on(scene.vertices, labels.instance)
     may_join = frozenset(entity.instance for entity in kept if entity.class_id in things)

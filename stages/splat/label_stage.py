@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scenewright.schemas.base import as_vector
 from scenewright.schemas.errors import BadInput
 from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
 from scenewright.schemas.panoptic_map import PanopticMap
@@ -13,6 +14,7 @@ from scenewright.schemas.trajectory import Trajectory
 from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
 from scenewright.stages.kit.formats.frames import FrameReader
 from scenewright.stages.kit.geometry.boxes import minimum_box
+from scenewright.stages.kit.geometry.point_clouds import middle_of
 from scenewright.stages.kit.geometry.transforms import inverse
 from scenewright.stages.kit.open_words.opening import open_encoder
 from scenewright.stages.kit.open_words.reading.evidence import colors_of, names_of_map
@@ -68,6 +70,7 @@ def run(
                 instance=entity.instance,
                 class_name=entity.class_name,
                 box=box,
+                point=as_vector(middle_of(np.asarray(mesh.vertices, float))),
                 looks=int(count),
                 names=dict(names[entity.instance].shares),
                 seen=names[entity.instance].looks,

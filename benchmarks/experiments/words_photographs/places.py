@@ -69,8 +69,8 @@ class AskedPhotographs(AskedLog):
 
     @cached_property
     def entity_places(self) -> list[np.ndarray]:
-        """Middles (3,) of the boxes of the map's entities [m]."""
-        return [np.array(region.box.center) for region in self.labels.info.regions]
+        """Where answers point that are entities of the map (3,) [m]."""
+        return [np.array(region.point or region.box.center) for region in self.labels.info.regions]
 
     @cached_property
     def truth(self) -> TrueRoom:

@@ -129,6 +129,12 @@ def linked(points: np.ndarray, norm: float = 2.0) -> list[np.ndarray]:
     return [np.flatnonzero(number == each) for each in range(number.max() + 1)]
 
 
+def middle_of(points: np.ndarray) -> np.ndarray:
+    """Return the point (3,) of points (N, 3), N >= 1, nearest their median [m]: the middle of a box about a corner of
+    walls lies in the air."""
+    return np.asarray(points[int(np.linalg.norm(points - np.median(points, axis=0), axis=1).argmin())])
+
+
 def without_strays(points: np.ndarray, share: float, distance: float) -> np.ndarray:
     """Return (N,) bool: which points (N, 3) are no stray clusters.
 

@@ -9,6 +9,7 @@ from scenewright.schemas.contact_graph import ContactGraphFile
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.language_map import LanguageMap, LanguageMapFile, LanguageRegion
 from scenewright.schemas.vocabulary import UNNAMED
+from scenewright.stages.kit.geometry.point_clouds import middle_of
 from scenewright.stages.kit.open_words.answering import MOST_ANSWERS, Fits, fits, ranked, region_index
 from scenewright.stages.kit.open_words.calibration import NAMED_SPLAT, Calibration, calibration_of, log_odds, recognised
 from scenewright.stages.kit.open_words.encoder import Encoder
@@ -156,12 +157,13 @@ class Finder:
         return self.is_strange or any(set(self.encoder.unread(text)) - in_classes for text in texts)
 
     def place(self, region: int) -> np.ndarray:
-        """Return (3,) where an answer points [m]: of the Gaussians of a piece the one nearest their median, as the
-        middle of a box about a corner of walls lies in the air; of an entity the middle of its box."""
+        """Return (3,) where an answer points [m]: on the surface, in the middle of what was seen of it; of an entity of
+        an older map the middle of its box."""
         points = self.vectors.means[self.index.members(region)].astype(float)
-        if not len(points):
-            return np.array(self.info.regions[region].box.center)
-        return points[int(np.linalg.norm(points - np.median(points, axis=0), axis=1).argmin())]
+        if len(points):
+            return middle_of(points)
+        known = self.info.regions[region]
+        return np.array(known.box.center if known.point is None else known.point)
 
     def _named(self, phrase: Phrase) -> np.ndarray:
         """Return (R,) how likely each region is what a phrase asks for; pieces of an entity are as likely as it is."""

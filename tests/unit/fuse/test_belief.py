@@ -42,18 +42,18 @@ def test_flat_on_a_wall_and_nothing() -> None:
 
 def test_doubt_has_two_reasons() -> None:
     flush = np.array([0.0, 0.1, 0.1, 0.9, 0.9, 0.1])
-    told = {1: 0.6, 2: 0.8, 3: 0.7 * AS_SURE - 0.01, 4: 0.7 * AS_SURE, 5: 0.6 * WEAK - 0.01}
+    told = np.array([0.0, 0.6, 0.8, 0.7 * AS_SURE - 0.01, 0.7 * AS_SURE, 0.6 * WEAK - 0.01])
     assert usual_score([1, 2], told, flush) == pytest.approx(0.7)
-    reasons = doubted([1, 2, 3, 4], told, flush)
+    reasons = doubted([1, 2, 3, 4], told, flush, 0.7)
     assert list(reasons) == [3] and reasons[3].startswith("flush along 90% of its outline")
-    reasons = doubted([1, 2, 5], told, flush)
+    reasons = doubted([1, 2, 5], told, flush, 0.6)
     assert list(reasons) == [5] and reasons[5].startswith("masks had it in few looks: 0.17 where 0.60")
 
 
 def test_without_a_thing_that_stands_free_half_of_the_looks_are_usual() -> None:
-    assert usual_score([], {}, np.zeros(1)) == 0.5
-    assert usual_score([1], {1: 0.9}, np.array([0.0, 0.9])) == 0.5
-    assert doubted([], {}, np.zeros(1)) == {}
+    assert usual_score([], np.zeros(1), np.zeros(1)) == 0.5
+    assert usual_score([1], np.array([0.0, 0.9]), np.array([0.0, 0.9])) == 0.5
+    assert doubted([], np.zeros(1), np.zeros(1), 0.5) == {}
 
 
 @given(
@@ -64,8 +64,12 @@ def test_surer_masks_are_not_doubted_more(rows: list[tuple[float, float]], which
     k = which % len(rows) + 1
     flush = np.array([0.0, *(f for f, _ in rows)])
     flush[k] = 1.0
-    told = {number: t for number, (_, t) in enumerate(rows, 1)}
-    surer = {**told, k: min(1.0, told[k] + more)}
-    before, after = doubted(sorted(told), told, flush), doubted(sorted(told), surer, flush)
+    told = np.array([0.0, *(t for _, t in rows)])
+    surer = told.copy()
+    surer[k] = min(1.0, told[k] + more)
+    things = list(range(1, len(told)))
+    usual = usual_score(things, told, flush)
+    assert usual == usual_score(things, surer, flush)
+    before, after = (doubted(things, each, flush, usual) for each in (told, surer))
     assert k in before or k not in after
     assert {j for j in before if j != k} == {j for j in after if j != k}
