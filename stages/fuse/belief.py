@@ -7,7 +7,7 @@ mask of a chair that runs over the counter behind it is not, one of a book on a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scenewright.stages.fuse.connecting import Cells, cells_of, neighbours_of
