@@ -2,22 +2,26 @@
 
 A camera sees the cover of a book and hardly its pages, the seat of a chair and not its underside. So what is taken from
 the map is by how much the surface that was seen differs from the model's own there, and the part's mean is shifted by
-that. Parts that nobody saw follow a seen part of the same colour (legs are alike), and else stay as they are.
+that. It is taken where the part is lit, as the walls are whose brightness tells the light (room_light.py), and half of
+it from what faces up, half from what stands upright: lamps hang over tops. Parts that nobody saw follow a seen part of
+the same colour (legs are alike), and else stay as they are.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from scenewright.stages.cad.model_surfaces import ModelSurface, to_model
+from scenewright.stages.cad.room_light import LIT
 from scenewright.stages.cad.shapes import Placement
-from scipy.stats import trim_mean
 
 NEAR = 0.03
 """Vertices farther from the model than this say nothing of its colour [m]."""
 LEAST_VERTICES = 10
 """Parts that fewer vertices show were not seen."""
-STRAY = 0.1
-"""Share of the vertices left out at both ends: labels leak."""
+AROUND = 15
+"""Percent of vertices, brighter and darker than LIT, that are taken for lit too."""
+UP, UPRIGHT = 0.7, 0.5
+"""Cosines to the vertical: over the first surface faces up, under the second it stands upright."""
 SAME_COLOR = 12.0
 """Parts of a model whose own mean colours differ by less are of one material (sRGB, 0 to 255)."""
 
@@ -37,7 +41,7 @@ def part_colors(
         of_part = close & (nearest.part == k)
         if np.count_nonzero(of_part) >= LEAST_VERTICES:
             own_look = surface.looks[part].colors[nearest.triangle[of_part]]
-            shifts[part] = trim_mean(colors[of_part].astype(float) - own_look, STRAY, axis=0)
+            shifts[part] = _of_lit(colors[of_part].astype(float) - own_look, normals[of_part, 2])
     if not shifts:
         return {}
     means = {part: surface.looks[part].mean for part in surface.model.parts}
@@ -50,3 +54,14 @@ def part_colors(
         red, green, blue = (int(value) for value in np.round(np.clip(mean + shift, 0, 255)))
         result[part] = (red, green, blue)
     return result
+
+
+def _of_lit(shifts: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+    """Return the mean (3,) of the shifts (N, 3) of lit vertices; `cosine` (N,) of their normals to the vertical."""
+    facing = [shifts[own] for own in (cosine > UP, np.abs(cosine) < UPRIGHT) if np.count_nonzero(own) >= LEAST_VERTICES]
+    means = []
+    for each in facing or [shifts]:
+        brightness = each.sum(axis=1)
+        low, high = np.percentile(brightness, [LIT - AROUND, LIT + AROUND])
+        means.append(each[(brightness >= low) & (brightness <= high)].mean(axis=0))
+    return np.asarray(np.mean(means, axis=0))
