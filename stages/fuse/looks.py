@@ -8,12 +8,12 @@ map is being built, as its things are known at the end.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scenewright.schemas.scene_parts import Camera
-from scenewright.schemas.segments import FrameSegment
+from scenewright.schemas.segments import FrameSegment, Witness
 from scenewright.stages.fuse.integration import intrinsics_of
 from scenewright.stages.fuse.names import Said
 from scenewright.stages.kit.geometry.cells import row_keys
@@ -41,6 +41,8 @@ class Look:
     """(N,) uint16: number of the mask, from 1; 0 none."""
     said: tuple[tuple[int, float], ...]
     """Class and score of each mask."""
+    witnesses: tuple[tuple[Witness, ...], ...] = ()
+    """Of several networks what each said of each mask."""
 
 
 @dataclass
@@ -77,6 +79,8 @@ class Looks:
         """Return by instance what was said of it. `points`: per look the mask and the instance of each, from `on`."""
         looks: dict[int, int] = defaultdict(int)
         scores: dict[int, dict[int, float]] = defaultdict(lambda: defaultdict(float))
+        networks = 1 + max((w.network for look in self.kept for mask in look.witnesses for w in mask), default=-1)
+        heard: dict[tuple[int, int], dict[int, float]] = defaultdict(lambda: defaultdict(float))
         for look, (mask, thing) in zip(self.kept, points, strict=True):
             seen, spoken = spoken_of(mask, thing, len(look.said))
             for k in seen:
@@ -84,8 +88,10 @@ class Looks:
             for number, k in spoken.items():
                 class_id, score = look.said[number - 1]
                 scores[k][class_id] += score
+                for witness in look.witnesses[number - 1] if look.witnesses else ():
+                    heard[k, witness.network][witness.class_id] += witness.score
         return {
-            k: Said(float(n), {c: min(score / n, 1.0) for c, score in sorted(scores[k].items())})
+            k: Said(float(n), _shares(scores[k], n), tuple(_shares(heard[k, each], n) for each in range(networks)))
             for k, n in sorted(looks.items())
         }
 
@@ -124,12 +130,14 @@ def look_of(
     stride = max(1, round(float(np.sqrt(depth.size / SAMPLES))))
     mask_of: dict[tuple[int, int], int] = {}
     said: list[tuple[int, float]] = []
+    witnesses: list[tuple[Witness, ...]] = []
     mask_of_index = np.zeros(len(segments) + 1, np.uint16)
     for number, segment in enumerate(segments, 1):
         if segment.class_id:
             key = (segment.class_id, segment.instance)
             if key not in mask_of:
                 said.append((segment.class_id, segment.score))
+                witnesses.append(segment.witnesses)
                 mask_of[key] = len(said)
             mask_of_index[number] = mask_of[key]
     z = depth[::stride, ::stride]
@@ -139,7 +147,13 @@ def look_of(
     rays = np.stack([(stride * columns - cx) / fx, (stride * rows - cy) / fy, np.ones(len(z))], axis=1)
     points = (z[:, None] * rays) @ world_from_camera[:3, :3].T + world_from_camera[:3, 3]
     mask = mask_of_index[index_image[::stride, ::stride][rows, columns]]
-    return Look(np.floor(points / voxel_size).astype(np.int32), mask, tuple(said))
+    several = tuple(witnesses) if any(witnesses) else ()
+    return Look(np.floor(points / voxel_size).astype(np.int32), mask, tuple(said), several)
+
+
+def _shares(scores: Mapping[int, float], looks: int) -> dict[int, float]:
+    """Return the mean score a look of each class, ascending."""
+    return {c: min(score / looks, 1.0) for c, score in sorted(scores.items())}
 
 
 def spoken_of(mask: np.ndarray, thing: np.ndarray, masks: int) -> tuple[list[int], dict[int, int]]:

@@ -1,9 +1,10 @@
 """What a thing is called: by what all looks at it said, and by their silence.
 
 Ours. Each look (looks.py) either names the thing, names it wrongly, or says nothing. How often the masks of this log
-name things says how much their silence means. Rooms hold some things more often than others, and each within a range of
-sizes: that is the prior. The name with the largest posterior is taken if it is likelier than not; else it is an
-`object`.
+name things says how much their silence means. Of several networks each is heard by itself, on the names that it knows:
+one that has no backpacks calls them chairs, and that is nothing against a backpack. Rooms hold some things more often
+than others, and each within a range of sizes: that is the prior. The name with the largest posterior is taken if it is
+likelier than not; else it is an `object`.
 A mask that calls a thing a wall, floor or window is silent about which thing it is.
 """
 
@@ -51,6 +52,12 @@ class Said:
     """In how many of them it was seen."""
     scores: Mapping[int, float]
     """Class -> mean score, 0..1 a look."""
+    networks: tuple[Mapping[int, float], ...] = ()
+    """Of several networks what each of them said; empty: there was one."""
+
+    def by_network(self) -> tuple[Mapping[int, float], ...]:
+        """Return the scores of each network."""
+        return self.networks or (self.scores,)
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,15 @@ class Rates:
     """They name it wrongly."""
     background: float
     """They name what has no name."""
+
+
+@dataclass(frozen=True)
+class Network:
+    """One of the networks of a log."""
+
+    rates: Rates
+    knows: frozenset[int]
+    """Classes of things that it named anything in the log."""
 
 
 @dataclass(frozen=True)
@@ -92,22 +108,36 @@ def rates_of(things: Sequence[Said], classes: frozenset[int]) -> Rates:
     return Rates(right, max(WRONG, confused * right), max(BACKGROUND, confused))
 
 
-def name_of(said: Said, rates: Rates, extent: float, vocabulary: Vocabulary, unnamed: int) -> Naming:
-    """Return the name of a thing with a diagonal of `extent` [m]; `unnamed` is the class of those without."""
+def networks_of(things: Sequence[Said], classes: frozenset[int]) -> tuple[Network, ...]:
+    """Return the networks that looked at these things; `classes`: of things that have a name."""
+    count = max((len(said.by_network()) for said in things), default=1)
+    heard = [[Said(t.looks, t.by_network()[n]) for t in things if n < len(t.by_network())] for n in range(count)]
+    naming = [[said for said in of_one if classes & set(said.scores)] for of_one in heard]
+    return tuple(
+        Network(rates_of(of_one, classes), classes & frozenset(c for said in of_one for c in said.scores))
+        for of_one in naming
+    )
+
+
+def name_of(
+    said: Said, usual: float, networks: Sequence[Network], extent: float, vocabulary: Vocabulary, unnamed: int
+) -> Naming:
+    """Return the name of a thing with a diagonal of `extent` [m].
+
+    `usual`: share of looks in which things are named by any network; `networks`: as in `networks_of`; `unnamed`: class
+    of things without a name.
+    """
     names = {c: s for c, s in said.scores.items() if c != unnamed and vocabulary.by_id(c).kind == "thing"}
-    possible = {c: s for c, s in names.items() if _can_be(vocabulary.by_id(c).name, extent, s >= rates.right)}
-    doubt = said.scores.get(unnamed, 0.0)
-    spoken = sum(names.values())
-    silent = max(0.0, 1.0 - spoken - doubt)
-    none = np.log(1.0 - rates.background) * silent + np.log(rates.background / CLASSES) * spoken
-    silence = np.log(max(1.0 - rates.right - rates.wrong, SILENT)) * silent
+    names |= {c: 0.0 for own in said.networks for c in own if c not in names and vocabulary.by_id(c).kind == "thing"}
+    names.pop(unnamed, None)
+    possible = [c for c, s in names.items() if _can_be(vocabulary.by_id(c).name, extent, s >= usual)]
     effective = LOOKS * said.looks / (said.looks + LOOKS)
-    odds = {
-        c: np.log(prior_odds(vocabulary.by_id(c).name))
-        + effective
-        * (s * np.log(rates.right) + (spoken - s) * np.log(rates.wrong / CLASSES) + silence - doubt * DOUBT - none)
-        for c, s in possible.items()
-    }
+    odds = {c: np.log(prior_odds(vocabulary.by_id(c).name)) for c in possible}
+    for network, scores in zip(networks, said.by_network(), strict=False):
+        own = {c: s for c, s in scores.items() if c in network.knows}
+        doubt = scores.get(unnamed, 0.0)
+        for c in network.knows & set(possible):
+            odds[c] += effective * _look_odds(own.get(c, 0.0), sum(own.values()), doubt, network.rates)
     order = sorted(odds, key=lambda c: (-odds[c], c))
     weights = np.exp(np.minimum([odds[c] for c in order], 50.0))
     rows = [(c, round(float(w / (1.0 + weights.sum())), 3)) for c, w in zip(order, weights, strict=True)]
@@ -116,6 +146,16 @@ def name_of(said: Said, rates: Rates, extent: float, vocabulary: Vocabulary, unn
     left = round(1.0 - sum(p for _, p in rows), 3)
     rule = "no name is likely enough" if rows else "no thing of its size has its name" if names else "nobody named it"
     return Naming(unnamed, left, tuple(rows[:RUNNERS_UP]), rule)
+
+
+def _look_odds(score: float, spoken: float, doubt: float, rates: Rates) -> float:
+    """Return the log odds by one look of a network that a thing has a name and not none. `score`: of that name,
+    `spoken`: of all names, `doubt`: of none, each a look."""
+    silent = max(0.0, 1.0 - spoken - doubt)
+    none = np.log(1.0 - rates.background) * silent + np.log(rates.background / CLASSES) * spoken
+    silence = np.log(max(1.0 - rates.right - rates.wrong, SILENT)) * silent
+    given = score * np.log(rates.right) + (spoken - score) * np.log(rates.wrong / CLASSES)
+    return float(given + silence - doubt * DOUBT - none)
 
 
 def prior_odds(class_name: str) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
-from scenewright.stages.fuse.names import Naming, Said, name_of, rates_of
+from scenewright.stages.fuse.names import Naming, Said, name_of, networks_of, rates_of
 from scenewright.stages.kit.class_extents import extent_of
 
 BY_MASKS = "masks"
@@ -47,13 +47,14 @@ def with_names(
     unnamed = vocabulary.by_name(UNNAMED).id
     names = things - {unnamed}
     of_things = [said.get(e.instance, NOTHING) for e in entities if e.class_id in things]
-    rates = rates_of([told for told in of_things if names & set(told.scores)], names)
+    networks = networks_of(of_things, names)
+    usual = rates_of([told for told in of_things if names & set(told.scores)], names).right
     result, reasons, class_id = [], {}, labelled.class_id.copy()
     for entity in entities:
         naming, shape = None, shapes.get(entity.instance, BY_MASKS)
         told = said.get(entity.instance, NOTHING)
         if entity.class_id in things:
-            naming = name_of(told, rates, extent_of(np.asarray(entity.mesh.vertices)), vocabulary, unnamed)
+            naming = name_of(told, usual, networks, extent_of(np.asarray(entity.mesh.vertices)), vocabulary, unnamed)
             class_id[labelled.instance == entity.instance] = naming.class_id
             entity = replace(entity, class_id=naming.class_id)
         elif entity.instance not in shapes:

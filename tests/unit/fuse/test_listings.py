@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenewright.schemas.segments import FrameSegment, FrameSegments, SegmentsFile
+from scenewright.schemas.segments import FrameSegment, FrameSegments, SegmentsFile, Witness
 from scenewright.stages.fuse.listings import Listings
 
+witness = st.builds(Witness, network=st.integers(0, 5), class_id=st.integers(0, 200), score=st.floats(0, 1))
 segment = st.fixed_dictionaries(
     {
         "id": st.integers(1, 2**24 - 1),
@@ -15,6 +16,7 @@ segment = st.fixed_dictionaries(
         "is_thing": st.booleans(),
         "score": st.floats(0, 1),
         "area": st.integers(0, 10**7),
+        "witnesses": st.lists(witness, max_size=3).map(tuple),
     }
 ).map(lambda fields: FrameSegment(**fields))
 frames = st.dictionaries(st.integers(0, 5000), st.lists(segment, max_size=5), max_size=6)

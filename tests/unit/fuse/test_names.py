@@ -15,9 +15,11 @@ from scenewright.stages.fuse.names import (
     SILENT,
     WRONG,
     Naming,
+    Network,
     Rates,
     Said,
     name_of,
+    networks_of,
     prior_odds,
     rates_of,
 )
@@ -30,7 +32,8 @@ USUAL = Rates(right=0.6, wrong=WRONG, background=BACKGROUND)
 
 
 def named(scores: dict[int, float], looks: float = 30.0, extent: float = 1.0, rates: Rates = USUAL) -> Naming:
-    return name_of(Said(looks, scores), rates, extent, VOCABULARY, OBJECT)
+    things = frozenset(e.id for e in VOCABULARY.classes if e.kind == "thing") - {OBJECT}
+    return name_of(Said(looks, scores), rates.right, [Network(rates, things)], extent, VOCABULARY, OBJECT)
 
 
 def chance(naming: Naming, class_name: int) -> float:
@@ -111,6 +114,36 @@ def test_rates_are_those_of_the_log_within_least_shares() -> None:
     assert rates_of([], things) == Rates(0.5, WRONG, BACKGROUND)
     assert rates_of([Said(9, {CHAIR: 1.0})], things).right == 1 - SILENT, "masks without errors"
     assert rates_of([Said(9, {CHAIR: 0.01})], things).right == SELDOM
+
+
+def heard(*networks: tuple[dict[int, float], frozenset[int]]) -> Naming:
+    """Name a thing of which each network said something and knows some classes."""
+    whole: dict[int, float] = {}
+    for scores, _ in networks:
+        whole = {c: max(whole.get(c, 0.0), scores.get(c, 0.0)) for c in whole | scores}
+    told = Said(30.0, whole, tuple(scores for scores, _ in networks))
+    return name_of(told, 0.6, [Network(USUAL, known) for _, known in networks], 0.5, VOCABULARY, OBJECT)
+
+
+def test_a_network_that_knows_no_backpacks_says_nothing_against_one() -> None:
+    backpack = class_id("backpack")
+    both, without = frozenset({CHAIR, backpack}), frozenset({CHAIR})
+    said = ({backpack: 0.25}, both)
+    alone = heard(said)
+    assert alone.class_id == backpack
+    beside = heard(said, ({CHAIR: 0.3}, without))
+    assert beside.class_id == backpack and chance(beside, CHAIR) >= chance(alone, CHAIR)
+    assert chance(heard(said, ({CHAIR: 0.3}, both)), backpack) < chance(beside, backpack), "who knows them is heard"
+    assert chance(heard(said, ({}, both)), backpack) < chance(heard(said, ({}, without)), backpack), "so is silence"
+
+
+def test_networks_know_what_they_named_and_have_rates_of_their_own() -> None:
+    things = [Said(10, {CHAIR: 0.5}, ({CHAIR: 0.5}, {})), Said(10, {TABLE: 0.4}, ({}, {TABLE: 0.4, WALL: 0.2}))]
+    first, second = networks_of(things, frozenset({CHAIR, TABLE}))
+    assert (first.knows, second.knows) == (frozenset({CHAIR}), frozenset({TABLE}))
+    assert (first.rates.right, second.rates.right) == (0.5, 0.4)
+    (only,) = networks_of([Said(10, {CHAIR: 0.5})], frozenset({CHAIR, TABLE}))
+    assert only == Network(rates_of([Said(10, {CHAIR: 0.5})], frozenset({CHAIR})), frozenset({CHAIR}))
 
 
 def test_a_mask_of_a_wall_is_silent_about_a_thing() -> None:
