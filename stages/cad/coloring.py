@@ -13,13 +13,18 @@ import numpy as np
 from scenewright.stages.cad.model_surfaces import ModelSurface, to_model
 from scenewright.stages.cad.room_light import LIT
 from scenewright.stages.cad.shapes import Placement
+from scipy.stats import trim_mean
 
 NEAR = 0.03
 """Vertices farther from the model than this say nothing of its colour [m]."""
 LEAST_VERTICES = 10
 """Parts that fewer vertices show were not seen."""
+STRAY = 0.1
+"""Share of the vertices of a small part left out at both ends: labels leak."""
 AROUND = 15
 """Percent of vertices, brighter and darker than LIT, that are taken for lit too."""
+MOSTLY_RIM = 256
+"""A part of fewer vertices is mostly rim, where labels leak: what is bright there is of something else."""
 UP, UPRIGHT = 0.7, 0.5
 """Cosines to the vertical: over the first surface faces up, under the second it stands upright."""
 SAME_COLOR = 12.0
@@ -57,7 +62,12 @@ def part_colors(
 
 
 def _of_lit(shifts: np.ndarray, cosine: np.ndarray) -> np.ndarray:
-    """Return the mean (3,) of the shifts (N, 3) of lit vertices; `cosine` (N,) of their normals to the vertical."""
+    """Return the mean (3,) of the shifts (N, 3) of lit vertices; of what is mostly rim that of all vertices but strays.
+
+    `cosine` (N,): of their normals to the vertical.
+    """
+    if len(shifts) < MOSTLY_RIM:
+        return np.asarray(trim_mean(shifts, STRAY, axis=0))
     facing = [shifts[own] for own in (cosine > UP, np.abs(cosine) < UPRIGHT) if np.count_nonzero(own) >= LEAST_VERTICES]
     means = []
     for each in facing or [shifts]:

@@ -151,6 +151,20 @@ def test_what_is_taken_is_by_how_much_the_seen_surface_differs(library):
     assert np.allclose(taken, two.mean - 20.0, atol=1.0)
 
 
+def test_the_colour_of_a_large_part_is_that_of_its_lit_surface(library):
+    """A top under a lamp, sides of which a third is in shadow: half of the colour is from the top, half from lit sides;
+    what leaks at the rim of a small part is no light."""
+    surface, placement = placement_at(library, "box_cube", (0, 0, 0), 0.0, 1.0)
+    points, normals = surface_points(mesh_of(library, "box_cube", (0, 0, 0), 0.0, 1.0))
+    points, normals = np.tile(points, (40, 1)), np.tile(normals, (40, 1))
+    top, shadow = normals[:, 2] > 0.9, np.arange(len(points)) // 7 % 3 == 0
+    colors = np.where(top, 180, np.where(shadow, 30, 100))[:, None].repeat(3, axis=1).astype(np.uint8)
+    assert part_colors(surface, placement, points, normals, colors) == {"body": (140, 140, 140)}
+    few = slice(0, 200)
+    brightest = np.where(np.arange(len(points)) % 12 == 0, 250, 90)[:, None].repeat(3, axis=1).astype(np.uint8)
+    assert part_colors(surface, placement, points[few], normals[few], brightest[few]) == {"body": (90, 90, 90)}
+
+
 def test_a_part_that_nobody_saw_follows_one_of_its_colour(library):
     where = ((0, 0, 0), 0.0, 1.0, {"door_hinge": 2.0})
     surface, placement = placement_at(library, "fridge_small", *where)
