@@ -19,11 +19,9 @@ from benchmarks.board.quick import quick_table, quick_units
 from benchmarks.board.real.figures import line
 from benchmarks.board.real.told import measure_truth
 from benchmarks.board.records import RECORDS, write_lines
-from benchmarks.board.rooms import Setting
+from benchmarks.board.rooms import REFERENCE_COMMIT, Setting
 from benchmarks.board.shards import JOBS, all_shards, measure_shard
 
-REFERENCE = "412dc5f3"
-"""The commit that claims of better are paired with."""
 UNFINISHED = 4
 """Exit code when a unit failed: what is measured is kept, and nothing is recorded of its shard."""
 
@@ -106,7 +104,7 @@ def setting_of(out: Path, method: str, *, keep: bool, data: Path = Path()) -> Se
     checkouts = out / "checkouts"
     return Setting(
         method=Method(checkout_of(method, checkouts)) if method else Method(),
-        reference=Method(checkout_of(REFERENCE, checkouts)),
+        reference=Method(checkout_of(REFERENCE_COMMIT, checkouts)),
         generator=Generator(out),
         work=out / "work",
         kept=out / "kept",

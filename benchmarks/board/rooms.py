@@ -17,6 +17,8 @@ from benchmarks.board.records import Line, Trial, judge_digest, key_of
 
 PUBLIC_PART, SEALED_PART = "public", "sealed"
 OURS, THESIS, REFERENCE = "ours", "thesis", "reference"
+REFERENCE_COMMIT = "412dc5f3"
+"""The commit that claims of better are paired with."""
 SEALED_RECIPES = ("kitchen", "office", "bedroom", "room", *("household", "lodging") * 4)
 """One sealed room each."""
 MOST_DRAWS = 20

@@ -22,7 +22,7 @@ from benchmarks.board.others import SYSTEMS
 from benchmarks.board.quick import NOT_RUN, quick_table, quick_units
 from benchmarks.board.reconstruct import ARMS
 from benchmarks.board.records import Line, Trial, key_of, line_text, read_lines, write_lines
-from benchmarks.board.rooms import SEALED_RECIPES, sealed_seed
+from benchmarks.board.rooms import REFERENCE, REFERENCE_COMMIT, SEALED_RECIPES, sealed_seed
 from benchmarks.board.shards import all_shards
 from benchmarks.board.statistics import over_rooms, paired
 from benchmarks.command import parser_of
@@ -102,6 +102,15 @@ def test_a_record_that_no_program_writes_is_refused(tmp_path: Path, damage: str)
 @pytest.mark.parametrize("told", [{"clean": False}, {"commit": "other"}])
 def test_a_record_of_no_committed_checkout_is_not_published(tmp_path: Path, told: dict) -> None:
     write_lines(tmp_path / "abc" / "sealed-1.jsonl", [line(**told)])
+    with pytest.raises(BadInput, match="not of that commit"):
+        publishing.read_versions(tmp_path)
+
+
+def test_the_reference_beside_a_method_is_of_its_own_commit(tmp_path: Path) -> None:
+    beside = line(arm=REFERENCE, commit=f"{REFERENCE_COMMIT}24")
+    write_lines(tmp_path / "abc" / "sealed-1.jsonl", [line(), beside])
+    assert [len(version.lines) for version in publishing.read_versions(tmp_path)] == [2]
+    write_lines(tmp_path / "abc" / "sealed-1.jsonl", [line(arm=REFERENCE)])
     with pytest.raises(BadInput, match="not of that commit"):
         publishing.read_versions(tmp_path)
 
