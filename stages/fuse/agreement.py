@@ -25,7 +25,7 @@ from scenewright.stages.fuse.testimony import BOUND, FOOTED, GROWN, JOINED, PIEC
 from scenewright.stages.fuse.votes import Votes
 
 MOST = 0.5
-"""Share of looks from which on masks make a window, door or curtain, and have all of a thing."""
+"""Share of looks from which on masks make a window, door or curtain, and have surface for sure."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ def agreed(
     instance = np.where(np.isin(labelled.instance, sorted(dropped)), 0, labelled.instance)
 
     is_thing = np.isin(labelled.class_id, sorted(things)) & (instance > 0)
-    # A screen that hangs flat on a wall is kept by masks as sure of it as of what stands free.
-    bounded = (layout.owner > 0) & ((instance == 0) | (is_thing & (told < AS_SURE * usual)))
+    # A screen that hangs flat on a wall is kept by most looks, or by masks as sure of it as of what stands free.
+    bounded = (layout.owner > 0) & ((instance == 0) | (is_thing & (told < min(MOST, AS_SURE * usual))))
     first = 1 + max([int(labelled.instance.max(initial=0)), *(e.instance for e in entities)])
     bounds = {first + k: kind for k, kind in enumerate((FLOOR, WALL, CEILING))}
     for number, kind in bounds.items():
@@ -96,7 +96,7 @@ def agreed(
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
     classes = {entity.instance: entity.class_id for entity in entities} | new_classes
-    instance = without_aprons(scene, instance, [k for k, c in classes.items() if c in things], voxel)
+    instance = without_aprons(scene, instance, own_told, [k for k, c in classes.items() if c in things], voxel)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
     points = looks.on(scene.vertices, labels.instance)
     may_join = frozenset(entity.instance for entity in kept if entity.class_id in things)
