@@ -16,7 +16,7 @@ from scenewright.stages.fuse.layout.evidence import Scene
 from scenewright.stages.fuse.pieces import LEVEL, RISE, members_of
 from scipy.spatial import cKDTree
 
-MOST = 0.5
+RISING = 0.5
 """Share of a thing that rises over its apron, and more than the apron is: a magazine on a table has none."""
 BELOW = 0.05
 """Share of a thing that may lie below its apron: the seat of a chair is none."""
@@ -41,7 +41,7 @@ def without_aprons(
     for patch, own in members_of(patch_of, 0).items():
         thing, height = int(thing_of[own[0]]), float(np.median(points[own, 2]))
         over = scene.vertices[members[thing], 2] - height
-        if len(own) >= MOST * len(over) or (over > RISE).mean() < MOST or (over < -RISE).mean() > BELOW:
+        if len(own) >= RISING * len(over) or (over > RISE).mean() < RISING or (over < -RISE).mean() > BELOW:
             continue
         if told[level[own]].mean() >= AS_SURE * told[members[thing]].mean():
             continue

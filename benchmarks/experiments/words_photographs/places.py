@@ -70,7 +70,7 @@ class AskedPhotographs(AskedLog):
     @cached_property
     def entity_places(self) -> list[np.ndarray]:
         """Where answers point that are entities of the map (3,) [m]."""
-        return [np.array(region.point or region.box.center) for region in self.labels.info.regions]
+        return [np.array(region.point) for region in self.labels.info.regions]
 
     @cached_property
     def truth(self) -> TrueRoom:
