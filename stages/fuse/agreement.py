@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenewright.schemas.vocabulary import UNNAMED, Vocabulary
-from scenewright.stages.fuse.aprons import without_aprons
 from scenewright.stages.fuse.belief import AS_SURE, doubted, flush_shares, usual_score
 from scenewright.stages.fuse.extraction import ExtractedEntity, LabelledSurface
 from scenewright.stages.fuse.feet import feet_of
@@ -95,8 +94,6 @@ def agreed(
         pieces = range(start + 1, start + 1 + int(found.piece.max(initial=0)))
         new_classes |= dict.fromkeys(pieces, unnamed)
         shapes |= dict.fromkeys(pieces, PIECE)
-    classes = {entity.instance: entity.class_id for entity in entities} | new_classes
-    instance = without_aprons(scene, instance, own_told, [k for k, c in classes.items() if c in things], voxel)
     kept, labels = relabelled(surface, entities, labelled, instance.astype(np.int32), new_classes)
     points = looks.on(scene.vertices, labels.instance)
     may_join = frozenset(entity.instance for entity in kept if entity.class_id in things)

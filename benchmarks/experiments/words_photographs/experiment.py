@@ -3,9 +3,9 @@
 Phrases were drawn beforehand (drawing.py). `thesis` asks the language field of a splat with the embedded encoder, at
 the size that fits best in the image that shows a right thing best, and always answers with one Gaussian. In
 `thesis_witnesses` every Gaussian has instead of vectors what the same masks say of it in the images that show it, and
-nouns are read as in ours; it always answers too. `ours_splat` asks pieces of that splat by the names of the entities
-that they belong to. `entities` asks what images show of every entity of the map, by the encoder. `ours` asks the same
-entities by names with probabilities, colours, sizes and the contact graph; `ours_classes` does without WordNet.
+nouns are read as in ours; it always answers too. `entities` asks what images show of every entity of the map, by the
+encoder. `ours` asks the same entities by names with probabilities, colours, sizes and the contact graph; `ours_classes`
+does without WordNet.
 
 Two bounds stand beside `ours`: how many things the map has an entity of, and how many are among the places of a phrase
 at all, whatever their order and threshold. No order of the same names finds more than the second.
@@ -165,8 +165,7 @@ def way_of(room: AskedPhotographs, arm: str, given: PhotographsParameters) -> Ca
         return way.find
     if arm == "thesis_witnesses":
         return WitnessWay(room, Meanings()).find
-    labels = room.language if arm == "ours_splat" else room.labels
-    finder = Finder(labels, encoder, meanings=Meanings(with_nouns=arm != "ours_classes"))
+    finder = Finder(room.labels, encoder, meanings=Meanings(with_nouns=arm != "ours_classes"))
     if arm == "entities":
         finder.has_names = False
     return lambda query: entity_places(room, finder, query, related=arm != "entities")
@@ -252,7 +251,6 @@ EXPERIMENT = Experiment(
     ),
     arms={
         "ours": "ours",
-        "ours_splat": "ours, pieces of the splat",
         "ours_classes": "ours, vocabulary alone",
         "entities": "entities by looks",
         "thesis_witnesses": "thesis's way, same networks",
