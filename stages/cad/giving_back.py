@@ -1,4 +1,4 @@
-"""Ours: a model that does not explain what was seen of its thing gives the mesh back.
+"""Ours: a model that does not explain what was seen of its thing gives way to the next, and at last to the mesh.
 
 Models err in shape, and what is moved aside out of its neighbours ends beside its surface. Both are judged where a
 model came to stand, by the share of the surface that it explains. A mesh explains all of it.
@@ -58,6 +58,7 @@ def went(arranged: Arrangement, chosen: Mapping[str, Placement], name: str) -> n
     return arranged.shifts.get(name, np.zeros(3))
 
 
-def given_back(entry: Shortlist, why: str) -> Shortlist:
-    """Return the shortlist of a thing that keeps its mesh after all."""
-    return replace(entry, placements=(), reason=f"no model: {why}")
+def given_back(entry: Shortlist, model_id: str, why: str) -> Shortlist:
+    """Return the shortlist of a thing without a model: it keeps its mesh after all where no other is left."""
+    left = tuple(placement for placement in entry.placements if placement.shape.model.id != model_id)
+    return replace(entry, placements=left, reason=f"{'' if left else 'no model: '}{why}")

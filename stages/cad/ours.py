@@ -23,7 +23,7 @@ from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.placing import placement_of, size_misfit
 from scenewright.stages.cad.scoring import score_of, would_tip
 from scenewright.stages.cad.shapes import Observed, Placement, Shape, shape_of_state, turned_frames
-from scenewright.stages.cad.target import Target, scale_fits, stands_in_wall
+from scenewright.stages.cad.target import Target, out_of_walls, scale_fits
 from scenewright.stages.cad.variety import varied
 
 TURNS = 3
@@ -99,14 +99,13 @@ class Ours:
         return min(self._screening_scores(target, matches), default=math.inf)
 
     def why_invalid(self, placement: Placement, target: Target) -> str | None:
-        """Scale, error, balance and walls."""
+        """Scale, error and balance."""
         if not scale_fits(placement, self.parameters):
             return "refined scale out of range"
         if placement.alignment_error > self.parameters.maximum_alignment_error:
             return "alignment error too large"
-        if not target.around.hangs and would_tip(placement, target.surfaces[placement.shape.model.id]):
-            return "does not stay as it lies"
-        return "stands in a wall" if stands_in_wall(placement, target, self.parameters) else None
+        tips = not target.around.hangs and would_tip(placement, target.surfaces[placement.shape.model.id])
+        return "does not stay as it lies" if tips else None
 
     def missing_allowed(self, missing: Sequence[int]) -> int:
         """One child that was badly seen must not cost a shelf its model: the best that exists will do, and the child
@@ -241,12 +240,13 @@ class Ours:
         return score_of(match, placement, error, surface, target.around, self.parameters)
 
     def _measure(self, target: Target, match: Match, placement: Placement) -> Placement:
-        """Return the placement with the alignment error over all vertices and the score that the choice minimises.
+        """Return the placement, out of walls, with the alignment error over all vertices and the score that the choice
+        minimises.
 
         A bowl stands in for a plate where the library has no plate like it: what fits hardly worse, and has the name,
         comes first.
         """
-        surface = target.surfaces[placement.shape.model.id]
+        surface, placement = target.surfaces[placement.shape.model.id], out_of_walls(placement, target)
         error = alignment_error(surface, placement, target.points)
         oriented = robust_error(surface, placement, target.points, target.normals, TRUNCATION)
         name, model_class = target.node.class_name, placement.shape.model.class_name

@@ -152,13 +152,14 @@ def within(plane: SurfacePlane, point: np.ndarray) -> bool:
     return 0.0 <= u <= 1.0 and 0.0 <= v <= 1.0
 
 
-def wall_depth(points: np.ndarray, observed: np.ndarray, walls: list[GraphNode]) -> float:
-    """Return how deep [m] points (N, 3) of a placed model reach into walls.
+def wall_depths(points: np.ndarray, observed: np.ndarray, walls: list[GraphNode]) -> list[tuple[float, np.ndarray]]:
+    """Return how deep [m] points (N, 3) of a placed model reach into each wall that they reach into, and the normal
+    (3,) that leads out of it.
 
     Only walls in front of which the object was seen: its centre `observed` (3,) lies on the side of the plane's normal
     and within its rectangle.
     """
-    deepest = 0.0
+    depths = []
     for wall in walls:
         for plane in wall.planes:
             if abs(plane.normal[2]) > 0.5 or len(plane.corners) != 4:
@@ -170,6 +171,7 @@ def wall_depth(points: np.ndarray, observed: np.ndarray, walls: list[GraphNode])
             u = (points - corners[0]) @ first / max(float(first @ first), 1e-12)
             v = (points - corners[0]) @ second / max(float(second @ second), 1e-12)
             behind = (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
-            if behind.any():
-                deepest = max(deepest, float(-(points[behind] @ normal + plane.offset).min()))
-    return deepest
+            depth = float(-(points[behind] @ normal + plane.offset).min()) if behind.any() else 0.0
+            if depth > 0.0:
+                depths.append((depth, normal))
+    return depths

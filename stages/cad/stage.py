@@ -109,8 +109,11 @@ def choose_and_write(
         levels = floor_levels(graph, context.output / "layout")
         arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
         while off := unexplaining(graph, panoptic_map, arranged, chosen, surfaces, method.least_explained):
-            chosen = {name: placement for name, placement in chosen.items() if name not in off}
-            shortlists |= {name: given_back(shortlists[name], why) for name, why in off.items()}
+            shortlists |= {
+                name: given_back(shortlists[name], chosen[name].shape.model.id, why) for name, why in off.items()
+            }
+            chosen |= {name: shortlists[name].placements[0] for name in off if shortlists[name].placements}
+            chosen = {name: placement for name, placement in chosen.items() if shortlists[name].placements}
             graph = with_carriers(as_seen, shortlists, chosen)
             obstacles, solids = meshes_that_stand(graph, chosen, shell, panoptic_map, context)
             arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,7 @@ from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
 from scenewright.stages.cad.parameters import CadParameters
-from scenewright.stages.cad.placing import placed_planes, supporting_surface, wall_depth, within
+from scenewright.stages.cad.placing import placed_planes, supporting_surface, wall_depths, within
 from scenewright.stages.cad.shapes import Observed, Placement, observed_frames
 from scenewright.stages.kit.geometry.boxes import bottom
 
@@ -114,11 +114,22 @@ def scale_fits(placement: Placement, parameters: CadParameters) -> bool:
 
 def stands_in_wall(placement: Placement, target: Target, parameters: CadParameters) -> bool:
     """Whether a placed model reaches deeper into a wall than what a wall's thickness explains."""
+    return any(depth > parameters.wall_penetration for depth, _ in _walls_within(placement, target))
+
+
+def out_of_walls(placement: Placement, target: Target) -> Placement:
+    """Return a placed model moved out of the walls that it reaches into: there it will stand."""
+    for depth, normal in _walls_within(placement, target):
+        placement = replace(placement, translation=placement.translation + depth * normal)
+    return placement
+
+
+def _walls_within(placement: Placement, target: Target) -> list[tuple[float, np.ndarray]]:
     box = target.node.box
     if box is None:
-        return False
+        return []
     points = to_world(placement, target.surfaces[placement.shape.model.id].hull_points(placement.shape.joints))
-    return wall_depth(points, np.asarray(box.center), target.around.walls) > parameters.wall_penetration
+    return wall_depths(points, np.asarray(box.center), target.around.walls)
 
 
 def unsupported_children(placement: Placement, around: Surroundings, parameters: CadParameters) -> tuple[str, ...]:

@@ -101,8 +101,7 @@ def _by_shape(entry: Shortlist, thing: Thing, method: CadMethod) -> tuple[Shortl
 
 def _of_family(entry: Shortlist, thing: Thing, method: CadMethod) -> tuple[Shortlist, str]:
     target, mesh, may_rename = thing.target, thing.mesh, not thing.named_by_hand
-    made = of_family(entry, target, mesh, thing.said, method.parameters, thing.made, may_rename=may_rename)
-    return (entry, made) if isinstance(made, str) else (made, "")
+    return of_family(entry, target, mesh, thing.said, method.parameters, thing.made, may_rename=may_rename)
 
 
 def _built_in(entry: Shortlist, thing: Thing, method: CadMethod) -> tuple[Shortlist, str]:

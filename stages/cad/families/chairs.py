@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scenewright.stages.cad.carcasses import Patches
+from scenewright.stages.cad.families.feet import star_below
 from scenewright.stages.cad.families.forms import Form, Piece, Reading
 from scenewright.stages.cad.families.reading import (
     ASIDE,
@@ -60,12 +61,13 @@ def read(reading: Reading) -> Form | str:
     if not back:
         return "it has no back"
     legs = posts_below(seat, own)
-    legs += corner_legs(seat, own, LEG, legs)
+    star = star_below(seat, legs, own)
+    legs += [] if star else corner_legs(seat, own, LEG, legs)
     if not legs:
         return "nothing carries its seat"
     if not _in_pairs(legs, seat) and not _as_wide(seat, back):
         return "a leg has no partner, and its seat is not as wide as its back, so that part of it is hidden"
-    return Form("chair", ("chair",), (seat, *back, *legs), own.turn)
+    return Form("chair", ("chair",), (seat, *back, *legs, *star), own.turn)
 
 
 def _in_pairs(legs: Sequence[Piece], seat: Piece) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from scenewright.stages.cad.built_ins import EXPLAINED
 from scenewright.stages.cad.carcasses import Patches, patches_of
 from scenewright.stages.cad.explained import NEAR
-from scenewright.stages.cad.families import cabinets, chairs, lamps, shelves, sofas, tables
+from scenewright.stages.cad.families import cabinets, chairs, lamps, screens, shelves, sofas, tables
 from scenewright.stages.cad.families.forms import Form, Reading
 from scenewright.stages.cad.families.reading import further_pieces
 from scenewright.stages.cad.target import Surroundings
@@ -23,6 +23,7 @@ FAMILIES: Mapping[str, tuple[tuple[str, ...], Callable[[Reading], Form | str]]] 
     "cabinet": (("cabinet", "wall_cabinet", "drawer_unit", "wardrobe", "fridge"), cabinets.read),
     "chair": (("chair",), chairs.read),
     "lamp": (("lamp",), lamps.read),
+    "screen": (("monitor",), screens.read),
     "shelf": (("shelf", "wall_shelf"), shelves.read),
     "sofa": (("sofa", "bed"), sofas.read),
     "table": (("table", "desk", "bench", "stool"), tables.read),

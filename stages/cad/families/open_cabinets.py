@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -10,7 +11,7 @@ import numpy as np
 from scenewright.stages.cad.carcasses import ACROSS, Patches, flat_places, own_yaw
 from scenewright.stages.cad.families.cabinet_parts import BOARD, FRONT, GAP, Thickness, boards, closed_leaf
 from scenewright.stages.cad.families.forms import Form, Leaf, Piece, Reading, box_piece
-from scenewright.stages.cad.families.reading import SAME_LEVEL, board_at, bounds, level_rows, levels
+from scenewright.stages.cad.families.reading import APART, SAME_LEVEL, board_at, bounds, level_rows, levels
 from scenewright.stages.cad.front_bars import front_of
 from scenewright.stages.cad.front_leaves import leaves_of
 from scenewright.stages.kit.geometry.boxes import minimum_rectangle
@@ -56,7 +57,7 @@ class Opened:
     """(3,)."""
     walls: Thickness
     shelves: tuple[float, ...]
-    """Heights of level places in it [m]."""
+    """Heights of level places in it, and at which things stand in it [m]."""
     door: tuple[float, float]
     """Between which heights its door is [m]."""
     hinge_right: bool
@@ -77,7 +78,7 @@ def read(reading: Reading) -> Form | str:
     forms: list[Form] = []
     for yaw in product(_yaws(reading.patches), 0.5 * np.pi * np.arange(4)):
         turned = reading.turned(reading.turn @ transform_from_yaw(sum(yaw), np.zeros(3))[:3, :3])
-        found = opened(turned.patches, turned.base)
+        found = opened(turned.patches, turned.base, turned.carrying)
         if isinstance(found, str):
             reasons.append(found)
             continue
@@ -100,8 +101,9 @@ def _yaws(patches: Patches) -> list[float]:
     return [own_yaw(patches), *(minimum_rectangle(points)[2] for points in at if len(points) >= 4)]
 
 
-def opened(patches: Patches, base: float) -> Opened | str:
-    """Return the carcass that looks to -y and its open door, or why there is none. `base`: height of the floor [m]."""
+def opened(patches: Patches, base: float, carrying: Sequence[float] = ()) -> Opened | str:
+    """Return the carcass that looks to -y and its open door, or why there is none. `base`: height of the floor,
+    `carrying`: heights at which things stand in it [m]."""
     places = [z for z, area in levels(patches) if area >= LEAST_SHELF]
     shelves = [board for z in places if (board := board_at("shelf", z, patches)) is not None]
     if not shelves:
@@ -125,10 +127,13 @@ def opened(patches: Patches, base: float) -> Opened | str:
         return swung
     right, angle = swung
     door = bounds(out.points[:, 2], out.areas)
-    inner = tuple(z for z in places if base + RIM < z < ends[2, 1] - RIM and _is_inside(z, patches, low, ends[:, 1]))
+    inner = [z for z in places if base + RIM < z < ends[2, 1] - RIM and _is_inside(z, patches, low, ends[:, 1])]
+    for z in carrying:
+        if base + RIM < z < ends[2, 1] - RIM and all(abs(z - other) > APART for other in inner):
+            inner.append(z)
     leaf = max(door[0], base), min(door[1], float(ends[2, 1]))
     walls = _walls(inside, low, ends[:, 1])
-    found = Opened(low, ends[:, 1], walls, inner, leaf, right, angle, (-THICK, 0.0))
+    found = Opened(low, ends[:, 1], walls, tuple(inner), leaf, right, angle, (-THICK, 0.0))
     return _door(found, out)
 
 

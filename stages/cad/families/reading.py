@@ -21,6 +21,8 @@ SAME_LEVEL = 0.02
 """Surface so near to a height is at it [m]: a voxel."""
 BOARD, THICKEST, THINNEST = 0.03, 0.12, 0.015
 """Thickness of a board whose underside nobody saw, and the bounds of one that was seen [m]; by eye."""
+APART = 0.05
+"""Boards one over the other are at least so far apart [m]."""
 UNDERSIDE = 0.05
 """An underside that was seen has at least this share of the top's area."""
 RECTANGULAR = 0.9

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from scenewright.stages.cad.carcasses import ACROSS, flat_places
+from scenewright.stages.cad.carcasses import ACROSS, Patches, flat_places
 from scenewright.stages.cad.families.forms import Form, Piece, Reading, box_piece
-from scenewright.stages.cad.families.reading import along_x, bounds, in_own_frame, levels, posts_below
+from scenewright.stages.cad.families.reading import APART, along_x, bounds, in_own_frame, levels, posts_below
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 FEWEST, ALIKE = 2, 0.4
@@ -18,8 +20,8 @@ AT_THE_REAR, BACK, LEAST_BACK = 0.06, 0.015, 0.3
 """Surface so near to the rear, looking to the front, is a back of this thickness [m], where it covers this share."""
 THICK = 0.025
 """Thickness of boards [m]: those of shelves have 2 to 3 cm."""
-APART = 0.05
-"""Boards are at least so far apart [m]."""
+AT_THE_END, DIVIDES = 0.1, 0.5
+"""Uprights are so near to an end [m], or go through so much of the depth; by eye."""
 SIDE = 0.02
 """Thickness of a side that nobody saw [m]."""
 
@@ -44,7 +46,9 @@ def read(reading: Reading) -> Form | str:
         boards += [board] if z in own.carrying or own.has_room(board) else []
     if len(boards) < FEWEST:
         return "cameras saw that there is nothing where its boards would be"
-    sides = posts_below(_lid(low, high), own, "side")
+    rear = _rear(patches, high)
+    uprights = posts_below(_lid(low, high), replace(own, patches=patches.chosen(~rear)), "side")
+    sides = [side for side in uprights if _holds(side, low, high)]
     if not sides:
         left, right = high.copy(), low.copy()
         left[0], right[0] = low[0] + SIDE, high[0] - SIDE
@@ -52,7 +56,7 @@ def read(reading: Reading) -> Form | str:
         sides = [side for side in sides if own.has_room(side)]
     if len(sides) < 2:
         return "nothing holds its boards"
-    return Form("shelf", ("shelf",), (*boards, *sides, *_back(own, low, high)), own.turn)
+    return Form("shelf", ("shelf",), (*boards, *sides, *_back(own, rear, low, high)), own.turn)
 
 
 def _from_the_front(reading: Reading) -> Reading:
@@ -83,9 +87,20 @@ def _lid(low: np.ndarray, high: np.ndarray) -> Piece:
     return box_piece("lid", np.array([*low[:2], high[2]]), np.array([*high[:2], high[2] + BACK]))
 
 
-def _back(reading: Reading, low: np.ndarray, high: np.ndarray) -> list[Piece]:
+def _holds(side: Piece, low: np.ndarray, high: np.ndarray) -> bool:
+    """Whether an upright is at an end of the boards or divides them: what stands on them does neither."""
+    ends = np.array([side.corners.min(axis=0), side.corners.max(axis=0)])
+    at_end = ends[0, 0] < low[0] + AT_THE_END or ends[1, 0] > high[0] - AT_THE_END
+    return bool(at_end or np.ptp(ends[:, 1]) > DIVIDES * (high[1] - low[1]))
+
+
+def _rear(patches: Patches, high: np.ndarray) -> np.ndarray:
+    """Return (N,) bool: the patches at the rear that look to the front."""
+    return np.asarray((patches.points[:, 1] > high[1] - AT_THE_REAR) & (patches.normals[:, 1] < -ACROSS))
+
+
+def _back(reading: Reading, rear: np.ndarray, low: np.ndarray, high: np.ndarray) -> list[Piece]:
     patches = reading.patches
-    rear = (patches.points[:, 1] > high[1] - AT_THE_REAR) & (patches.normals[:, 1] < -ACROSS)
     if patches.areas[rear].sum() < LEAST_BACK * (high[0] - low[0]) * (high[2] - low[2]):
         return []
     front = float(np.average(patches.points[rear, 1], weights=patches.areas[rear]))

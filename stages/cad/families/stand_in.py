@@ -57,8 +57,9 @@ def of_family(
     models: Path,
     *,
     may_rename: bool,
-) -> Shortlist | str:
-    """Return the shortlist of a thing with the form of its family first, or why there is none.
+) -> tuple[Shortlist, str]:
+    """Return the shortlist of a thing with the form of its family, and why that is not first: what does not explain
+    clearly more than the best model goes last.
 
     Its model is written into the folder `models`, its surface added to the target's. `said`: class -> what masks gave
     it a look; `may_rename`: whether shape may say what it is.
@@ -68,40 +69,43 @@ def of_family(
     own = [name for name, (classes, _) in FAMILIES.items() if node.class_name in classes]
     tried = list(FAMILIES) if unknown else own
     if not tried or node.box is None:
-        return "nothing of its class is of a family"
+        return entry, "nothing of its class is of a family"
     if target.around.hangs:
         tried = [name for name in tried if name in HANG]
         if not tried:
-            return "it hangs, and what its class is a family of stands"
+            return entry, "it hangs, and what its class is a family of stands"
     reading = surface_to_read(target.around, mesh)
     fits = {name: fit(name, reading) for name in tried}
     found = [fitted for fitted in fits.values() if isinstance(fitted, Fitted)]
     if not found:
-        return "; ".join(f"no {name}: {why}" for name, why in fits.items())
+        return entry, "; ".join(f"no {name}: {why}" for name, why in fits.items())
     best = likeliest(found, node.class_name, said, reading)
+    why_not = ""
     if entry.placements:
         before = explained_by(entry.placements[0], target, reading)
         nearly = best.explained >= share(before, reading.patches) - NEARLY
         denied = nearly and contradicts_handles(entry.placements[0], best.form)
         if not denied and not explains_clearly_more(best.near, before, reading.patches):
             shares = f"{best.explained:.0%} explained, by the model {share(before, reading.patches):.0%}"
-            return f"a {best.form.family} of parts is not clearly better: {shares}"
+            why_not = f"a {best.form.family} of parts is not clearly better: {shares}"
     renamed = node.model_copy(update=class_of(node, best.form, said, carried_by(target)))
     placement, surface = write_form(renamed, best.form, models / f"{node.id}_{best.form.family}")
     target.surfaces[surface.model.id] = surface
     missing = unsupported_children(placement, target.around, parameters)
     allowed = unsupported_children(entry.placements[0], target.around, parameters) if entry.placements else ()
     if stands_in_wall(placement, target, parameters):
-        return "it would stand in a wall"
+        return entry, why_not or "it would stand in a wall"
     if len(missing) > len(allowed):
-        return f"nothing of it would support {', '.join(missing)}"
+        return entry, why_not or f"nothing of it would support {', '.join(missing)}"
     cost = robust_error(surface, placement, target.points, target.normals, TRUNCATION)
     if entry.placements:  # what explains more goes first, whatever else models are judged by
-        cost = min(cost, entry.placements[0].score)
+        cost = (max if why_not else min)(cost, entry.placements[0].score)
     placement = replace(placement, alignment_error=rms(surface, placement, target), score=cost)
+    if why_not:
+        return replace(entry, placements=(*entry.placements, placement)), why_not
     reason = f"a {best.form.family} of {best.form.words}; {best.explained:.0%} explained"
     placements = (placement, *entry.placements)
-    return replace(entry, node=renamed, placements=placements, reason=reason, carrier=target.around.surface_below)
+    return replace(entry, node=renamed, placements=placements, reason=reason, carrier=target.around.surface_below), ""
 
 
 def likeliest(found: Sequence[Fitted], class_name: str, said: Mapping[str, float], reading: Reading) -> Fitted:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scenewright.stages.cad.families.forms import Form, Piece, Reading, box_piece
+from scenewright.stages.cad.families.feet import foot_below
+from scenewright.stages.cad.families.forms import Form, Piece, Reading
 from scenewright.stages.cad.families.reading import along_x, board_at, corner_legs, in_own_frame, levels, posts_below
 from scenewright.stages.kit.geometry.steadiness import stands_steadily
 
@@ -13,10 +14,8 @@ ABOVE, MOST_ABOVE = 0.06, 0.1
 """From so far above a top on [m], there is at most this share of the surface."""
 SHELF = 0.4
 """A shelf below a top has this share of its area."""
-STOOL, SEAT = 0.55, 0.6
-"""A stool is no wider, and what people sit on is no higher [m]."""
-FEET, FOOT = (0.3, 0.4, 0.5, 0.6, 0.7), 0.03
-"""Widths of a foot that nobody saw, as shares of the top's, and its height [m]."""
+STOOL, BENCH, SEAT = 0.55, 0.45, 0.6
+"""A stool is no wider, a bench no deeper, and what people sit on is no higher [m]."""
 LEG = 0.05
 """Width of legs that nobody saw [m]: those of tables have 4 to 8 cm; by eye."""
 
@@ -25,10 +24,10 @@ def read(reading: Reading) -> Form | str:
     """Return the table that a surface shows, or why there is none."""
     own = along_x(in_own_frame(reading))
     patches = own.patches
-    places = [(height, area) for height, area in levels(patches) if height > own.base + LOWEST]
-    if not places or places[0][1] < LEAST_TOP:
+    places = levels(patches)
+    height, area = next(((z, area) for z, area in places if z > own.base + LOWEST), (0.0, 0.0))
+    if area < LEAST_TOP:
         return "it has no top"
-    height, area = places[0]
     above = patches.areas[patches.points[:, 2] > height + ABOVE].sum()
     if above > MOST_ABOVE * patches.areas.sum():
         return f"{above / patches.areas.sum():.0%} of its surface is above its largest level place"
@@ -43,30 +42,17 @@ def read(reading: Reading) -> Form | str:
     if not own.seen_through(top):
         return "nobody saw through below its top"
     if not stands_steadily([top.corners, *(leg.corners for leg in legs)], own.base):
-        legs = [*legs, *_foot(top, legs, own)]
-    shelves = [board_at("shelf", z, patches) for z, share in places[1:] if share > SHELF * area and z < height - ABOVE]
+        legs = [*legs, *foot_below(top, legs, own)]
+    shelves = [board_at("shelf", z, patches) for z, share in places if share > SHELF * area and z < height - ABOVE]
     pieces: list[Piece] = [top, *legs, *(shelf for shelf in shelves if shelf is not None)]
     size = np.ptp(top.corners, axis=0)[:2]
     return Form("table", _classes(float(size.max()), float(size.min()), height - own.base), tuple(pieces), own.turn)
-
-
-def _foot(top: Piece, legs: list[Piece], reading: Reading) -> list[Piece]:
-    """Return the least foot on which a top stands whose legs were seen in its middle; nothing without room."""
-    low, high = top.corners.min(axis=0)[:2], top.corners.max(axis=0)[:2]
-    for share in FEET:
-        half = 0.5 * share * (high - low)
-        middle = 0.5 * (low + high)
-        ends = np.array([*(middle - half), reading.base]), np.array([*(middle + half), reading.base + FOOT])
-        foot = box_piece("foot", *ends, seen=False)
-        if stands_steadily([top.corners, foot.corners, *(leg.corners for leg in legs)], reading.base):
-            return [foot] if reading.has_room(foot) else []
-    return []
 
 
 def _classes(length: float, depth: float, height: float) -> tuple[str, ...]:
     """Return what a table of a size may be called, the likeliest first."""
     if length <= STOOL and height <= 0.85:
         return ("stool", "table")
-    if height <= SEAT and depth <= STOOL:
+    if height <= SEAT and depth <= BENCH:
         return ("bench", "table", "stool")
     return ("table", "desk")

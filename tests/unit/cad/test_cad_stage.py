@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ import trimesh
 from scenewright.schemas.errors import UsageError
 from scenewright.schemas.scene_parts import SurfacePlane
 from scenewright.stages.cad.fitting import fitted, refine, shape_at, solve_within_limits
-from scenewright.stages.cad.model_surfaces import alignment_error, load_surface
-from scenewright.stages.cad.placing import facing_wall, free_height, placed_box, supporting_surface, wall_depth
+from scenewright.stages.cad.model_surfaces import alignment_error, load_surface, to_world
+from scenewright.stages.cad.placing import facing_wall, free_height, placed_box, supporting_surface, wall_depths
 from scenewright.stages.cad.settling import shift_onto
 from scenewright.stages.cad.shapes import Placement, shape_of_state
+from scenewright.stages.cad.target import out_of_walls
 from scenewright.stages.kit.formats.cad_models import model_folder, posed_mesh
 from scenewright.stages.kit.geometry.boxes import bottom, box_from_bounds, box_iou, gravity_aligned_box
 from scenewright.stages.kit.geometry.point_clouds import sample_large_triangles, thin_to_grid
@@ -330,8 +332,16 @@ def test_walls_reject_and_turn_fronts(library):
     plane = SurfacePlane(normal=(1, 0, 0), offset=0.0, area=10, center=(0, 0, 1.25), corners=corners)
     wall = GraphNode(id="wall_1", instance=1, class_name="wall", node_type="layout", planes=(plane,))
     points = np.array([[-0.2, 0, 1], [0.3, 0, 1], [-0.9, 3.0, 1.0]])
-    assert wall_depth(points, np.array([0.3, 0, 1]), [wall]) == pytest.approx(0.2)
-    assert wall_depth(points, np.array([-0.3, 0, 1]), [wall]) == 0.0
+    ((depth, out),) = wall_depths(points, np.array([0.3, 0, 1]), [wall])
+    assert depth == pytest.approx(0.2) and out.tolist() == [1, 0, 0]
+    assert wall_depths(points, np.array([-0.3, 0, 1]), [wall]) == []
+    surface, inside = placement_at(library, "fridge_small", (0.2, 0, 0), math.pi / 2, 1.0)
+    seen = SimpleNamespace(node=SimpleNamespace(box=placed_box(inside, surface)), around=SimpleNamespace(walls=[wall]))
+    seen.surfaces = {"fridge_small": surface}
+    clear = out_of_walls(inside, seen)
+    assert np.allclose(clear.translation[1:], inside.translation[1:])
+    assert to_world(clear, surface.hull_points(clear.shape.joints))[:, 0].min() == pytest.approx(0.0, abs=1e-9)
+    assert out_of_walls(clear, seen).translation == pytest.approx(clear.translation)
     surface, away = placement_at(library, "fridge_small", (0.3, 0, 0), math.pi / 2, 1.0)
     box = placed_box(away, surface)
     assert facing_wall(away, box, [wall]) == pytest.approx(0.0, abs=1e-9)

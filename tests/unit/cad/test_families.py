@@ -42,12 +42,12 @@ class Known:
         return np.zeros(len(points))
 
 
-def reading_of(boxes, *, yaw=0.3, unseen=(), hidden=(), noise=0.002, at=(0.2, -0.1, 0.0)) -> Reading:
-    """The surface of boxes (low, high) but for those of the numbers `unseen`, as cameras all around would see it."""
+def reading_of(boxes, *, yaw=0.3, unseen=(), hidden=(), noise=0.002, at=(0.2, -0.1, 0.0), eyes=EYES) -> Reading:
+    """The surface of boxes (low, high) but for those of the numbers `unseen`, as cameras would see it: all around."""
     pose = transform_from_yaw(yaw, np.array(at))
     whole = [placed(trimesh.creation.box(bounds=box), at, yaw) for box in boxes]
     shown = trimesh.util.concatenate([mesh for k, mesh in enumerate(whole) if k not in unseen])
-    mesh = seen_surface({1: shown}, EYES, noise=noise)[1]
+    mesh = seen_surface({1: shown}, eyes, noise=noise)[1]
     entity = EntityMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((len(mesh.vertices), 3), np.uint8))
     return Reading(patches_of(entity), 0.0, np.eye(3), Known(boxes, pose, hidden), cKDTree(entity.vertices))
 
@@ -178,6 +178,71 @@ def test_a_chair_whose_seat_is_half_hidden_is_refused():
     assert isinstance(found, str) and "has no partner" in found
 
 
+def screen(wide=0.56, high=0.34, low=0.12):
+    """Of a screen what is left when a desk has its foot: a panel over a neck behind it."""
+    panel = ((-wide / 2, 0.0, low), (wide / 2, 0.03, low + high))
+    return [panel, ((-0.03, 0.03, 0.01), (0.03, 0.06, low + 0.1))]
+
+
+def swivel_chair(seat=0.45, reach=0.3):
+    """A seat on a column, a back, and four arms with castors."""
+    boxes = [((-0.22, -0.2, seat - 0.06), (0.22, 0.2, seat)), ((-0.2, 0.18, seat + 0.1), (0.2, 0.22, 0.96))]
+    boxes += [((-0.03, 0.19, seat - 0.06), (0.03, 0.22, 0.6)), ((-0.03, -0.03, 0.06), (0.03, 0.03, seat - 0.06))]
+    for along, across in ((0, 1), (1, 0)):
+        for sign in (-1, 1):
+            first, last = sorted((0.0, sign * reach))
+            tip, end = sorted((sign * (reach - 0.04), sign * reach))
+            for low, high, z in ((first, last, (0.06, 0.09)), (tip, end, (0.0, 0.06))):
+                corners = np.array([[low, -0.02, z[0]], [high, 0.02, z[1]]])
+                boxes.append(tuple(corners[:, [along, across, 2]]))
+    return boxes
+
+
+def test_a_swivel_chair_stands_on_the_arms_of_its_star():
+    form = fitted_at_least(0.85, "chair", reading_of(swivel_chair()))
+    assert len(named(form, "arm")) == len(named(form, "castor")) == 4
+    feet = np.concatenate([piece.corners for piece in named(form, "castor")])
+    assert feet[:, 2].min() == pytest.approx(0.0, abs=1e-9)
+    assert extents(*named(form, "castor"))[:2] == pytest.approx([0.6, 0.6], abs=0.05)
+
+
+def test_two_arms_are_no_star():
+    found = fit("chair", reading_of(swivel_chair()[:8]))
+    assert isinstance(found, str) and "would not stand" in found
+
+
+def test_a_low_table_has_its_low_shelf():
+    form = fitted("table", reading_of([*table(1.1, 0.6, 0.45), ((-0.45, -0.2, 0.1), (0.45, 0.2, 0.13))]))
+    (low,) = named(form, "shelf")
+    assert low.corners[:, 2].max() == pytest.approx(0.13, abs=0.01)
+
+
+def test_a_shelf_with_a_back_has_its_divider_and_nothing_that_stands_on_its_boards():
+    boxes = [*shelf((0.03, 0.66, 1.3)), ((-0.45, 0.165, 0.0), (0.45, 0.175, 1.3))]
+    boxes += [((-0.01, -0.175, 0.0), (0.01, 0.165, 1.3)), ((0.15, 0.08, 0.03), (0.3, 0.16, 1.28))]
+    before = [(x, y, z) for x, y, z in EYES if y < 0]
+    form = fitted_at_least(0.85, "shelf", reading_of(boxes, yaw=0.0, eyes=before))
+    off = sorted(side.corners[:, 0].mean() - 0.2 for side in named(form, "side"))
+    assert off == pytest.approx([-0.44, 0.0, 0.44], abs=0.03)
+    assert len(named(form, "back")) == 1
+
+
+@pytest.mark.parametrize("yaw", [0.3, 2.8])
+def test_a_screen_stands_on_a_foot_that_a_desk_took(yaw):
+    reading = reading_of(screen(), yaw=yaw)
+    form = fitted("screen", reading)
+    assert form.words == "panel, neck; inferred: foot" and form.classes == ("monitor",)
+    (panel,), (neck,) = named(form, "panel"), named(form, "neck")
+    assert extents(panel)[[0, 2]] == pytest.approx([0.56, 0.34], abs=FINE) and extents(panel)[1] < 0.08
+    assert neck.corners[:, 2].min() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_neck_that_nobody_saw_is_there_where_masks_name_a_screen():
+    reading = reading_of(screen()[:1])
+    assert "nobody saw a neck" in str(fit("screen", reading))
+    assert "inferred: neck, foot" in fitted("screen", replace(reading, class_name="monitor")).words
+
+
 def test_a_shelf_has_its_boards_and_sides():
     form = fitted("shelf", reading_of(shelf()))
     tops = sorted(piece.corners[:, 2].max() for piece in named(form, "board"))
@@ -228,6 +293,10 @@ def test_a_bed_is_as_wide_both_ways():
             [((-0.5, -0.2, 0.0), (0.5, 0.2, 0.6)), ((-0.25, -0.2, 0.6), (0.25, 0.2, 1.0))],
             "nothing where its boards would be",
         ),
+        ("screen", table(1.4, 0.8, 0.75), "its face is not solid"),
+        ("screen", screen(0.34, 0.56), "higher than wide"),
+        ("screen", screen(low=0.0), "its face is not lifted"),
+        ("screen", [screen()[0], ((-0.25, 0.06, 0.0), (0.25, 0.09, 0.12))], "as wide"),
         ("sofa", [((-0.9, -0.4, 0.0), (0.9, 0.4, 0.45))], "nothing of it is higher than its seat"),
         ("sofa", [((-0.9, -0.4, 0.0), (0.9, 0.4, 0.9))], "it has no seat"),
     ],

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scenewright.schemas.contact_graph import SCENE_NODE, ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import Relation
 from scenewright.stages.cad.arranging import Arrangement
-from scenewright.stages.cad.giving_back import unexplaining
+from scenewright.stages.cad.candidates import Shortlist
+from scenewright.stages.cad.giving_back import given_back, unexplaining
 
 from tests.panoptic_maps import box_mesh, write_map
 from tests.unit.cad.test_cad_stage import placement_at
@@ -50,3 +52,14 @@ def test_what_explains_less_than_half_gives_its_mesh_back(scene):
 
 def test_what_goes_along_with_its_carrier_is_judged_by_its_own_way(scene):
     assert set(scene((0.3, 0.0, 0.0), carrier=(0.3, 0.0, 0.0))) == {"box_2"}
+
+
+def test_the_next_model_takes_the_place_of_one_that_goes():
+    def placed(model_id):
+        return SimpleNamespace(shape=SimpleNamespace(model=SimpleNamespace(id=model_id)))
+
+    entry = Shortlist(None, tuple(map(placed, ("chair_1", "chair_2", "chair_1"))), {}, "")
+    second = given_back(entry, "chair_1", "chair_1 would explain 30%")
+    assert [placement.shape.model.id for placement in second.placements] == ["chair_2"]
+    last = given_back(second, "chair_2", "chair_2 would explain 40%")
+    assert last.placements == () and last.reason == "no model: chair_2 would explain 40%"

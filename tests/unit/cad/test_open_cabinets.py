@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,6 +87,13 @@ def test_boards_are_where_they_were_seen():
     assert tops == pytest.approx(SHELVES, abs=0.01) and all(
         piece.level is not None for piece in form.pieces if piece.name == "board"
     )
+
+
+def test_a_board_is_where_something_stands():
+    reading = replace(open_reading(1.8), carrying=(SHELVES[0] + 0.01, 1.4))
+    form = fit("cabinet", reading).form
+    tops = sorted(piece.corners[:, 2].max() for piece in form.pieces if piece.name == "board")
+    assert tops == pytest.approx([*SHELVES, 1.4], abs=0.01)
 
 
 def test_a_carcass_without_a_door_is_none_of_these():
