@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scenewright.stages.cad.carcasses import Patches
-from scenewright.stages.cad.families.feet import star_below
+from scenewright.stages.cad.families.feet import column_below, least_foot, star_below
 from scenewright.stages.cad.families.forms import Form, Piece, Reading
 from scenewright.stages.cad.families.reading import (
     ASIDE,
@@ -17,6 +17,7 @@ from scenewright.stages.cad.families.reading import (
     levels,
     posts_below,
 )
+from scenewright.stages.kit.geometry.steadiness import stands_steadily
 from scenewright.stages.kit.geometry.transforms import transform_from_yaw
 
 SEAT_LOW, SEAT_HIGH, LEAST_SEAT = 0.3, 0.65, 0.06
@@ -61,13 +62,16 @@ def read(reading: Reading) -> Form | str:
     if not back:
         return "it has no back"
     legs = posts_below(seat, own)
-    star = star_below(seat, legs, own)
-    legs += [] if star else corner_legs(seat, own, LEG, legs)
+    feet = star_below(seat, legs, own)
+    legs += [] if feet else corner_legs(seat, own, LEG, legs)
+    legs = legs or column_below(seat, own)
     if not legs:
         return "nothing carries its seat"
     if not _in_pairs(legs, seat) and not _as_wide(seat, back):
         return "a leg has no partner, and its seat is not as wide as its back, so that part of it is hidden"
-    return Form("chair", ("chair",), (seat, *back, *legs, *star), own.turn)
+    if not feet and not stands_steadily([piece.corners for piece in (seat, *back, *legs)], own.base):
+        feet = least_foot(seat, [*back, *legs], own)
+    return Form("chair", ("chair",), (seat, *back, *legs, *feet), own.turn)
 
 
 def _in_pairs(legs: Sequence[Piece], seat: Piece) -> bool:

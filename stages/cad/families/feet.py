@@ -10,8 +10,10 @@ from scenewright.stages.cad.families.reading import ASIDE, EVERYWHERE
 from scenewright.stages.kit.geometry.steadiness import stands_steadily
 from scipy.ndimage import label
 
-FEET, FOOT = (0.3, 0.4, 0.5, 0.6, 0.7), 0.03
+FEET, FOOT = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0), 0.03
 """Widths of a foot that nobody saw, as shares of the top's, and its height [m]."""
+COLUMN = 0.08
+"""Width of a column that nobody saw [m]; by eye."""
 LOW = 0.15
 """A star is surface around a column that is no higher than this [m]."""
 OUTER = 0.6
@@ -26,14 +28,15 @@ SEEN = 0.6
 
 def foot_below(board: Piece, posts: Sequence[Piece], reading: Reading) -> list[Piece]:
     """Return what a board stands on whose posts do not hold it: a star, else the least foot; nothing without room."""
-    return star_below(board, posts, reading) or _least_foot(board, posts, reading)
+    return star_below(board, posts, reading) or least_foot(board, posts, reading)
 
 
 def star_below(board: Piece, posts: Sequence[Piece], reading: Reading) -> list[Piece]:
     """Return the arms of the star that was seen around the one column below the middle of a board, each with a castor
     down to the ground; nothing where fewer than three were seen.
 
-    A map gives what is close to the floor to the floor, so that of castors hardly anything is left.
+    A map gives what is close to the floor to the floor, so that of castors hardly anything is left. Arms that nobody
+    saw are where the others leave a gap, if there is room.
     """
     low, high = board.corners.min(axis=0)[:2], board.corners.max(axis=0)[:2]
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -53,13 +56,26 @@ def star_below(board: Piece, posts: Sequence[Piece], reading: Reading) -> list[P
         return []
     under, over = np.percentile(height[~outer], (5, 95))
     over_tip = np.percentile(height[outer], 95)
-    pieces = []
-    for tip in tips:
-        root = (1 - ARM / np.linalg.norm(tip)) * tip
-        pieces.append(_bar("arm", np.zeros(2), tip, (under, over, under, over_tip)))
-        pieces.append(_bar("castor", root, tip, (0.0, under, 0.0, under)))
     at = np.array([*center, reading.base])
-    return [Piece(piece.name, piece.corners + at) for piece in pieces]
+
+    def arm(tip: np.ndarray, seen: bool) -> list[Piece]:
+        root = (1 - ARM / np.linalg.norm(tip)) * tip
+        bars = ("arm", np.zeros(2), (under, over, under, over_tip)), ("castor", root, (0.0, under, 0.0, under))
+        return [Piece(name, _bar(first, tip, heights) + at, seen) for name, first, heights in bars]
+
+    unseen = [arm(tip, False) for tip in _missing(tips)]
+    arms = [arm(tip, True) for tip in tips] + [some for some in unseen if all(map(reading.has_room, some))]
+    return [piece for some in arms for piece in some]
+
+
+def _missing(tips: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return the tips (2,) that a star lacks: its arms are at equal angles, and as long."""
+    angles = np.sort([np.arctan2(tip[1], tip[0]) for tip in tips])
+    gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
+    counts = np.maximum(np.round(gaps / np.median(gaps)).astype(int), 1)
+    reach = np.median([np.linalg.norm(tip) for tip in tips])
+    turns = [a + gap * k / n for a, gap, n in zip(angles, gaps, counts, strict=True) for k in range(1, n)]
+    return [reach * np.array([np.cos(turn), np.sin(turn)]) for turn in turns]
 
 
 def _tips(points: np.ndarray, areas: np.ndarray) -> list[np.ndarray]:
@@ -86,22 +102,30 @@ def _seen_along(points: np.ndarray, tip: np.ndarray) -> float:
     return len(np.unique((along[beside] / ARM).astype(int))) * ARM / reach
 
 
-def _bar(name: str, first: np.ndarray, last: np.ndarray, heights: Sequence[float]) -> Piece:
-    """Return a bar from one place (2,) to another; `heights`: below and above, at the one and at the other [m]."""
+def _bar(first: np.ndarray, last: np.ndarray, heights: Sequence[float]) -> np.ndarray:
+    """Return the corners (8, 3) of a bar from one place (2,) to another; `heights`: below and above, at both [m]."""
     along = (last - first) / np.linalg.norm(last - first)
     across = 0.5 * ARM * np.array([-along[1], along[0]])
     ends = ((first, heights[:2]), (last, heights[2:]))
-    return Piece(name, np.array([[*(end + side * across), z] for end, zs in ends for side in (-1, 1) for z in zs]))
+    return np.array([[*(end + side * across), z] for end, zs in ends for side in (-1, 1) for z in zs])
 
 
-def _least_foot(board: Piece, posts: Sequence[Piece], reading: Reading) -> list[Piece]:
-    """Return the least foot that holds a board whose posts were seen in its middle; nothing without room."""
+def column_below(board: Piece, reading: Reading) -> list[Piece]:
+    """Return the column below the middle of a board that nobody saw, where there is room: what has no legs has one."""
+    middle, low = 0.5 * (board.corners.min(axis=0) + board.corners.max(axis=0))[:2], board.corners[:, 2].min()
+    ends = np.array([*(middle - 0.5 * COLUMN), reading.base]), np.array([*(middle + 0.5 * COLUMN), low])
+    column = box_piece("leg", *ends, seen=False)
+    return [column] if reading.has_room(column) else []
+
+
+def least_foot(board: Piece, above: Sequence[Piece], reading: Reading) -> list[Piece]:
+    """Return the least foot below the middle of a board that holds it and what is `above`; nothing without room."""
     low, high = board.corners.min(axis=0)[:2], board.corners.max(axis=0)[:2]
     for share in FEET:
         half = 0.5 * share * (high - low)
         middle = 0.5 * (low + high)
         ends = np.array([*(middle - half), reading.base]), np.array([*(middle + half), reading.base + FOOT])
         foot = box_piece("foot", *ends, seen=False)
-        if stands_steadily([board.corners, foot.corners, *(post.corners for post in posts)], reading.base):
+        if stands_steadily([board.corners, foot.corners, *(piece.corners for piece in above)], reading.base):
             return [foot] if reading.has_room(foot) else []
     return []

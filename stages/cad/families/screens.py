@@ -57,7 +57,7 @@ def read(reading: Reading) -> Form | str:
     foot = _foot(own, panel, neck)
     if foot is None:
         return "no foot holds it"
-    return Form(SCREEN, (SCREEN,), (panel, neck, foot), own.turn)
+    return Form("screen", (SCREEN,), (panel, neck, foot), own.turn)
 
 
 def _face(patches: Patches) -> tuple[float, float, np.ndarray | None]:

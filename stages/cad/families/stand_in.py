@@ -92,7 +92,7 @@ def of_family(
     placement, surface = write_form(renamed, best.form, models / f"{node.id}_{best.form.family}")
     target.surfaces[surface.model.id] = surface
     missing = unsupported_children(placement, target.around, parameters)
-    allowed = unsupported_children(entry.placements[0], target.around, parameters) if entry.placements else ()
+    allowed = unsupported_children(entry.placements[0], target.around, parameters) if entry.placements else missing
     if stands_in_wall(placement, target, parameters):
         return entry, why_not or "it would stand in a wall"
     if len(missing) > len(allowed):
@@ -104,6 +104,7 @@ def of_family(
     if why_not:
         return replace(entry, placements=(*entry.placements, placement)), why_not
     reason = f"a {best.form.family} of {best.form.words}; {best.explained:.0%} explained"
+    reason += f"; does not quite support {', '.join(missing)}" if missing else ""
     placements = (placement, *entry.placements)
     return replace(entry, node=renamed, placements=placements, reason=reason, carrier=target.around.surface_below), ""
 

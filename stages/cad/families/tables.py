@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from scenewright.stages.cad.families.feet import foot_below
+from scenewright.stages.cad.families.feet import column_below, foot_below
 from scenewright.stages.cad.families.forms import Form, Piece, Reading
 from scenewright.stages.cad.families.reading import along_x, board_at, corner_legs, in_own_frame, levels, posts_below
 from scenewright.stages.kit.geometry.steadiness import stands_steadily
@@ -35,18 +37,24 @@ def read(reading: Reading) -> Form | str:
     if top is None:
         return "its top has no outline"
     legs = posts_below(top, own)
-    if not stands_steadily([top.corners, *(leg.corners for leg in legs)], own.base):
+    if not _stands(top, legs, own):
         legs += corner_legs(top, own, LEG, legs)
+    if not any(leg.seen for leg in legs) and not _stands(top, legs, own):
+        legs = column_below(top, own)
     if not legs:
         return "nothing carries its top"
     if not own.seen_through(top):
         return "nobody saw through below its top"
-    if not stands_steadily([top.corners, *(leg.corners for leg in legs)], own.base):
+    if not _stands(top, legs, own):
         legs = [*legs, *foot_below(top, legs, own)]
     shelves = [board_at("shelf", z, patches) for z, share in places if share > SHELF * area and z < height - ABOVE]
     pieces: list[Piece] = [top, *legs, *(shelf for shelf in shelves if shelf is not None)]
     size = np.ptp(top.corners, axis=0)[:2]
     return Form("table", _classes(float(size.max()), float(size.min()), height - own.base), tuple(pieces), own.turn)
+
+
+def _stands(top: Piece, legs: Sequence[Piece], reading: Reading) -> bool:
+    return stands_steadily([top.corners, *(leg.corners for leg in legs)], reading.base)
 
 
 def _classes(length: float, depth: float, height: float) -> tuple[str, ...]:
