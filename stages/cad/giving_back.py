@@ -15,7 +15,7 @@ from scenewright.schemas.panoptic_map import PanopticMap
 from scenewright.stages.cad.arranging import Arrangement
 from scenewright.stages.cad.candidates import Shortlist
 from scenewright.stages.cad.carcasses import patches_of
-from scenewright.stages.cad.explained import NEAR, explained_by_model
+from scenewright.stages.cad.explained import explained_by_model
 from scenewright.stages.cad.model_surfaces import ModelSurface
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.kit.formats.entity_meshes import load_entity_mesh
@@ -28,12 +28,13 @@ def unexplaining(
     chosen: Mapping[str, Placement],
     surfaces: Mapping[str, ModelSurface],
     least: float,
+    within: float,
 ) -> dict[str, str]:
     """Return node -> why its model is none any more, for models that explain less than a share `least` of what was
     seen of their thing, where the arrangement put them.
 
     The way along with what carries it, and up or down onto it, does not count: the graph asks for these. Surface is
-    explained within `NEAR` [m]. Raises BadInput for meshes that cannot be read.
+    explained that is as near as `within` [m]. Raises BadInput for meshes that cannot be read.
     """
     why = {}
     for name, placement in arranged.placements.items():
@@ -44,7 +45,7 @@ def unexplaining(
         along = np.array([*went(arranged, chosen, "" if link is None else link.source)[:2], way[2]])
         patches = patches_of(load_entity_mesh(panoptic_map.path(mesh)))
         patches = replace(patches, points=patches.points + along)
-        share = explained_by_model(surfaces[placement.shape.model.id], placement, patches, NEAR).by_model
+        share = explained_by_model(surfaces[placement.shape.model.id], placement, patches, within).by_model
         if share < least:
             aside = 1000 * np.linalg.norm(way - along)
             why[name] = f"{placement.shape.model.id} would explain {share:.0%}, {aside:.0f} mm aside"

@@ -47,6 +47,13 @@ class Explanation:
     """The surface of the map that nothing explains."""
 
 
+def explained_within(graph: ContactGraphFile, panoptic_map: PanopticMap) -> float:
+    """Return how near surface of a map has to be to what explains it [m]: as near as it is known where depth spreads.
+    Raises BadInput for meshes that cannot be read."""
+    patches = {name: patches_of(mesh) for name, mesh in _meshes(graph, panoptic_map).items()}
+    return NEAR + depth_spread(_planes(graph, patches))
+
+
 def explanation_of(
     graph: ContactGraphFile,
     panoptic_map: PanopticMap,
@@ -54,12 +61,12 @@ def explanation_of(
     shortlists: Mapping[str, Shortlist],
     surfaces: dict[str, ModelSurface],
     output: Path,
+    within: float,
 ) -> Explanation:
-    """Return what a scene explains whose meshes, layout and surroundings lie in `output`. Raises BadInput for meshes
-    that cannot be read."""
-    meshes = {node.id: load_entity_mesh(panoptic_map.path(node.mesh)) for node in graph.nodes if node.mesh is not None}
+    """Return what a scene explains whose meshes, layout and surroundings lie in `output`: surface so near [m] as
+    `within`. Raises BadInput for meshes that cannot be read."""
+    meshes = _meshes(graph, panoptic_map)
     patches = {name: patches_of(mesh) for name, mesh in meshes.items()}
-    within = NEAR + depth_spread(_planes(graph, patches))
     things, others = {}, {}
     for node in graph.nodes:
         if node.id not in meshes or node.node_type == "layout":
@@ -88,6 +95,10 @@ def next_models(candidates: Sequence[Placement], chosen: Placement) -> dict[str,
         if candidate.shape.model.id != chosen.shape.model.id and len(best) < RUNNERS_UP:
             best.setdefault(candidate.shape.model.id, candidate)
     return best
+
+
+def _meshes(graph: ContactGraphFile, panoptic_map: PanopticMap) -> dict[str, EntityMesh]:
+    return {node.id: load_entity_mesh(panoptic_map.path(node.mesh)) for node in graph.nodes if node.mesh is not None}
 
 
 def _planes(graph: ContactGraphFile, patches: dict[str, Patches]) -> Iterator[tuple[SurfacePlane, Patches]]:

@@ -36,7 +36,7 @@ from scenewright.stages.cad.parameters import CadParameters
 from scenewright.stages.cad.recognition import named_by_people, renamed, with_carriers
 from scenewright.stages.cad.records import cad_graph, scene_file
 from scenewright.stages.cad.room_light import gain_by_walls, relight, relit
-from scenewright.stages.cad.scene_explanation import explanation_of
+from scenewright.stages.cad.scene_explanation import explained_within, explanation_of
 from scenewright.stages.cad.shapes import Placement
 from scenewright.stages.cad.shell import drawn, shell_file, shell_of
 from scenewright.stages.cad.stretching import source_of, write_stretched
@@ -76,8 +76,9 @@ def run(
     surfaces: dict[str, ModelSurface] = {}
     with context.progress.step("candidates"):
         moved = () if articulations is None else articulations.info.articulations
-        shortlists = find_candidates(contact_graph.info, panoptic_map, library, surfaces, method, context, moved)
-    return choose_and_write(contact_graph.info, panoptic_map, library, shortlists, surfaces, method, context, moved)
+        graph, within = contact_graph.info, explained_within(contact_graph.info, panoptic_map)
+        shortlists = find_candidates(graph, panoptic_map, library, surfaces, method, context, within, moved)
+    return choose_and_write(graph, panoptic_map, library, shortlists, surfaces, method, context, within, moved)
 
 
 def choose_and_write(
@@ -88,10 +89,11 @@ def choose_and_write(
     surfaces: dict[str, ModelSurface],
     method: CadMethod,
     context: Context,
+    within: float,
     moved: Sequence[Articulation] = (),
 ) -> CadScene:
-    """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4). `moved`: what the log
-    shows in two states."""
+    """Choose among the candidates of all objects, arrange the scene and write it (section 2.4.4). `within`: surface so
+    near is explained [m]; `moved`: what the log shows in two states."""
     as_seen = renamed(graph, shortlists)
     first = {name: entry.placements[0] for name, entry in shortlists.items() if entry.placements}
     graph = with_carriers(as_seen, shortlists, first)
@@ -108,7 +110,7 @@ def choose_and_write(
         graph = with_carriers(as_seen, shortlists, chosen)
         levels = floor_levels(graph, context.output / "layout")
         arranged, conflicts_after = adjust(graph, chosen, shortlists, surfaces, solids, levels, method)
-        while off := unexplaining(graph, panoptic_map, arranged, chosen, surfaces, method.least_explained):
+        while off := unexplaining(graph, panoptic_map, arranged, chosen, surfaces, method.least_explained, within):
             shortlists |= {
                 name: given_back(shortlists[name], chosen[name].shape.model.id, why) for name, why in off.items()
             }
@@ -141,7 +143,7 @@ def choose_and_write(
         gain = gain_of_light(graph, panoptic_map) if corrects else 1.0
         colors = colors_of_parts(graph, arranged, surfaces, panoptic_map, gain)
         evidence = grounds_of_joints(graph, arranged, shortlists, surfaces, panoptic_map, moved, method)
-        explanation = explanation_of(graph, panoptic_map, arranged, shortlists, surfaces, context.output)
+        explanation = explanation_of(graph, panoptic_map, arranged, shortlists, surfaces, context.output, within)
         if explanation.rest is not None:
             write_surface(explanation.rest, context.output / UNEXPLAINED)
         placed = ((name, p, surfaces[p.shape.model.id]) for name, p in arranged.placements.items())
@@ -201,10 +203,12 @@ def find_candidates(
     surfaces: dict[str, ModelSurface],
     method: CadMethod,
     context: Context,
+    within: float,
     moved: Sequence[Articulation] = (),
 ) -> dict[str, Shortlist]:
     """Return the shortlist of every object; surfaces of the models that were needed are added to `surfaces`. Models of
-    built-ins are written into the output. `moved`: what the log shows in two states."""
+    built-ins are written into the output. `within`: surface so near is explained [m]; `moved`: what the log shows in
+    two states."""
     objects = [node for node in graph.nodes if node.node_type in ("rigid", "articulated")]
     free_space, named_by_hand = method.free_space(panoptic_map), named_by_people(panoptic_map)
     because = panoptic_map.because
@@ -229,7 +233,7 @@ def find_candidates(
             method.parameters.vertices,
             context.random(VERTICES, node.instance),
         )
-        target = Target(points, facing, Surroundings(node, graph, free_space), suitable, surfaces)
+        target = Target(points, facing, Surroundings(node, graph, free_space, within), suitable, surfaces)
         words, by_hand = said.get(node.instance, {}), node.id in named_by_hand
         thing = Thing(target, mesh, library, moved, words, by_hand, context.output / "models")
         shortlists[node.id] = sought(thing, method)

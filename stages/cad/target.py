@@ -10,6 +10,7 @@ from scenewright.schemas.cad_library import CadModel
 from scenewright.schemas.contact_graph import ContactGraphFile, GraphNode
 from scenewright.schemas.scene_parts import Relation
 from scenewright.schemas.vocabulary import load_vocabulary
+from scenewright.stages.cad.explained import NEAR
 from scenewright.stages.cad.free_space import FreeSpace
 from scenewright.stages.cad.model_surfaces import ModelSurface, to_world
 from scenewright.stages.cad.parameters import CadParameters
@@ -25,6 +26,8 @@ class Surroundings:
     node: GraphNode
     graph: ContactGraphFile
     free_space: FreeSpace
+    within: float = NEAR
+    """Surface so near is explained [m]."""
 
     @property
     def walls(self) -> list[GraphNode]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scenewright.stages.cad.built_ins import EXPLAINED
 from scenewright.stages.cad.carcasses import Patches, patches_of
-from scenewright.stages.cad.explained import NEAR
 from scenewright.stages.cad.families import cabinets, chairs, lamps, screens, shelves, sofas, tables
 from scenewright.stages.cad.families.forms import Form, Reading
 from scenewright.stages.cad.families.reading import further_pieces
@@ -60,12 +59,13 @@ def surface_to_read(around: Surroundings, mesh: EntityMesh) -> Reading:
     height, own = around.stands_at, cKDTree(mesh.vertices)
     walls = tuple(plane for wall in around.walls for plane in wall.planes if not plane.horizontal)
     name = around.node.class_name
-    return Reading(patches, height, np.eye(3), around.free_space, own, carrying, around.hangs, walls, name)
+    return Reading(
+        patches, height, np.eye(3), around.free_space, own, carrying, around.hangs, walls, name, around.within
+    )
 
 
-def fit(family: str, reading: Reading, within: float = NEAR) -> Fitted | str:
-    """Return the form of a family that explains a surface, world frame, or why there is none. `within`: surface so near
-    is explained [m]."""
+def fit(family: str, reading: Reading) -> Fitted | str:
+    """Return the form of a family that explains a surface, world frame, or why there is none."""
     if len(reading.patches.areas) < FEWEST:
         return "hardly any surface"
     form = FAMILIES[family][1](reading)
@@ -78,7 +78,7 @@ def fit(family: str, reading: Reading, within: float = NEAR) -> Fitted | str:
     free = form.classes[0] not in BUILT_IN
     if free and not stands_steadily([piece.corners for piece in form.pieces], reading.base):
         return "it would not stand"
-    near = form.distance(own.patches) < within
+    near = form.distance(own.patches) < reading.within
     explained = share(near, own.patches)
     return Fitted(form, near, explained) if explained >= EXPLAINED else f"it explains {explained:.0%}"
 

@@ -108,7 +108,7 @@ class Form:
     def explains(self, reading: Reading) -> float:
         """Return how much of a surface lies near it [m²]."""
         patches = reading.turned(self.turn).patches
-        return float(patches.areas[self.distance(patches) < NEAR].sum())
+        return float(patches.areas[self.distance(patches) < reading.within].sum())
 
     @property
     def words(self) -> str:
@@ -145,6 +145,8 @@ class Reading:
     """Upright planes of the room's walls, world frame."""
     class_name: str = ""
     """What masks named it."""
+    within: float = NEAR
+    """Surface so near is explained [m]."""
 
     def turned(self, turn: np.ndarray) -> Reading:
         """Return it in another frame: `turn` (3, 3), world from that frame."""

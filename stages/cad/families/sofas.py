@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scenewright.stages.cad.carcasses import ACROSS, grid_of
 from scenewright.stages.cad.families.forms import Form, Piece, Reading, box_piece
@@ -14,6 +16,8 @@ SEAT_LOW, SEAT_HIGH, LEAST_SEAT = 0.2, 0.65, 0.3
 """Between which heights a seat or a mattress is [m], and its least area [m²]."""
 HIGHER, LEAST_HIGHER = 0.12, 0.02
 """Back, arms and headboards end so much higher [m], on this share of the ground at least."""
+SAG = 0.08
+"""Tops this near in height are of one block [m]; by eye."""
 HIGHEST = 1.4
 """A sofa or bed ends below this [m]."""
 LYING, MOST_HIGHER = 1.0, 0.15
@@ -37,7 +41,7 @@ def read(reading: Reading) -> Form | str:
     if high[2] - own.base > HIGHEST:
         return "it is higher than a sofa"
     cuts = grid_of(patches, low, high).cuts
-    heights = np.array(sorted(z for z, _ in places if z > own.base + SEAT_LOW))
+    heights = _heights([z for z, _ in places if z > own.base + SEAT_LOW])
     tops, seen = _tops(own, (cuts[0], cuts[1]), heights)
     if not seen.any():
         return "nobody looked down on it"
@@ -58,6 +62,14 @@ def read(reading: Reading) -> Form | str:
             pieces += [piece] if is_seen or own.has_room(piece) else []
     lain_on = min((high - low)[:2]) > LYING and higher < MOST_HIGHER and bool(np.all(tops >= 0))
     return Form("sofa", ("bed", "sofa") if lain_on else ("sofa", "bed"), tuple(pieces), own.turn)
+
+
+def _heights(places: Sequence[float]) -> np.ndarray:
+    """Return the heights of blocks [m], ascending, of level places, the largest first: cushions sag."""
+    heights: list[float] = []
+    for z in places:
+        heights += [z] if all(abs(z - other) > SAG for other in heights) else []
+    return np.array(sorted(heights))
 
 
 def _back_behind(reading: Reading) -> Reading:

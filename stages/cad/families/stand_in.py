@@ -19,7 +19,6 @@ from scenewright.schemas.contact_graph import GraphNode
 from scenewright.schemas.scene_parts import Joint
 from scenewright.schemas.vocabulary import load_vocabulary
 from scenewright.stages.cad.candidates import Shortlist
-from scenewright.stages.cad.explained import NEAR
 from scenewright.stages.cad.families.fitting import FAMILIES, Fitted, explains_clearly_more, fit, share, surface_to_read
 from scenewright.stages.cad.families.forms import INFERRED_WORDS, Form, Piece, Reading
 from scenewright.stages.cad.made_models import BODY, FAMILY, part_of, plane_of
@@ -126,7 +125,7 @@ def explained_by(placement: Placement, target: Target, reading: Reading) -> np.n
     """Return (N,) bool: the patches of a surface, world frame, that a placed model explains."""
     surface = target.surfaces[placement.shape.model.id]
     nearest = surface.closest(to_model(placement, reading.patches.points), placement.shape.joints)
-    return np.asarray(placement.scale * nearest.distance < NEAR)
+    return np.asarray(placement.scale * nearest.distance < reading.within)
 
 
 def contradicts_handles(placement: Placement, form: Form) -> bool:

@@ -36,7 +36,7 @@ def scene(tmp_path, library):
         moved = [replace(placement, translation=np.array(each, dtype=float)) for each in (shift, carrier)]
         arranged = Arrangement(dict(zip(names, moved, strict=True)), {}, {})
         chosen = dict.fromkeys(names, placement)
-        return unexplaining(graph, panoptic_map, arranged, chosen, {"box_cube": surface}, least)
+        return unexplaining(graph, panoptic_map, arranged, chosen, {"box_cube": surface}, least, within=0.02)
 
     return judged
 
