@@ -24,9 +24,9 @@ LEAST_NECK = 0.002
 """Surface of a neck that was seen [m²]."""
 NECK = (0.06, 0.03)
 """Width and depth of a neck that nobody saw [m]; by eye."""
-FEET = ((0.3, 0.12), (0.35, 0.15), (0.4, 0.18), (0.5, 0.21), (0.6, 0.25))
-"""What is tried of a foot: width as a share of the panel's, depth [m]. It is no higher than seen space is known:
-nobody can have seen that it is not there."""
+FEET = ((0.4, 0.2), (0.5, 0.25))
+"""What is tried of a foot: width as a share of the panel's, depth [m], which those of screens on desks have. It is no
+higher than seen space is known: nobody can have seen that it is not there."""
 
 
 def read(reading: Reading) -> Form | str:
@@ -108,7 +108,7 @@ def _neck(reading: Reading, panel: Piece) -> Piece | str:
 
 
 def _foot(reading: Reading, panel: Piece, neck: Piece) -> Piece | None:
-    """Return the least foot about a neck on which a screen stands; None where none of those tried holds it."""
+    """Return the foot about a neck on which a screen stands; None where none of those tried holds it."""
     middle = 0.5 * (neck.corners.min(axis=0) + neck.corners.max(axis=0))
     width = float(np.ptp(panel.corners[:, 0]))
     for share, depth in FEET:

@@ -16,12 +16,15 @@ SEAT_LOW, SEAT_HIGH, LEAST_SEAT = 0.2, 0.65, 0.3
 """Between which heights a seat or a mattress is [m], and its least area [m²]."""
 HIGHER, LEAST_HIGHER = 0.12, 0.02
 """Back, arms and headboards end so much higher [m], on this share of the ground at least."""
-SAG = 0.08
+SAG = 0.05
 """Tops this near in height are of one block [m]; by eye."""
 HIGHEST = 1.4
 """A sofa or bed ends below this [m]."""
 LYING, MOST_HIGHER = 1.0, 0.15
 """What is so wide both ways [m], without a corner left out, and has at most this share that is higher, is lain on."""
+LEAST_BOARD, THICKEST = 0.05, 0.15
+"""Surface of a headboard that rises over all else [m²], and its thickness at most [m]; by eye. At a short end, it is a
+bed's."""
 SEEN = 0.2
 """The top of a cell of the ground is seen where surface that looks up covers this share of it."""
 UNSEEN = 0.2
@@ -49,9 +52,10 @@ def read(reading: Reading) -> Form | str:
     if ground[~seen & (tops >= 0)].sum() > UNSEEN * ground.sum():
         return "a large part of it was not looked down on"
     higher = float(ground[(tops >= 0) & (heights[tops] > seats[0][0] + HIGHER)].sum() / ground.sum())
-    if higher < LEAST_HIGHER:
+    board = _headboard(own, seats[0][0] + HIGHER) if higher < LEAST_HIGHER else None
+    if higher < LEAST_HIGHER and board is None:
         return "nothing of it is higher than its seat"
-    pieces: list[Piece] = []
+    pieces = [] if board is None else [board]
     for number in np.unique(tops[tops >= 0]):
         for first, last in merge_cells(np.argwhere((tops == number)[:, :, None])):
             a = np.array([cuts[0][first[0]], cuts[1][first[1]], own.base])
@@ -60,8 +64,21 @@ def read(reading: Reading) -> Form | str:
             is_seat = abs(heights[number] - seats[0][0]) < HIGHER
             piece = box_piece("seat" if is_seat else "block", a, b, seen=is_seen, carries=True)
             pieces += [piece] if is_seen or own.has_room(piece) else []
-    lain_on = min((high - low)[:2]) > LYING and higher < MOST_HIGHER and bool(np.all(tops >= 0))
+    wide = min((high - low)[:2]) > LYING and higher < MOST_HIGHER and bool(np.all(tops >= 0))
+    lain_on = wide or (board is not None and np.ptp(board.corners[:, 0]) < np.ptp(board.corners[:, 1]))
     return Form("sofa", ("bed", "sofa") if lain_on else ("sofa", "bed"), tuple(pieces), own.turn)
+
+
+def _headboard(reading: Reading, height: float) -> Piece | None:
+    """Return the board that stands higher than a height [m], too thin to be looked down on; None without one."""
+    high = reading.patches.chosen(reading.patches.points[:, 2] > height)
+    if len(high.areas) == 0 or high.areas.sum() < LEAST_BOARD:
+        return None
+    ends = np.array([bounds(high.points[:, axis], high.areas) for axis in range(3)])
+    if min(np.ptp(ends[:2], axis=1)) > THICKEST:
+        return None
+    board = box_piece("headboard", np.array([*ends[:2, 0], reading.base]), ends[:, 1])
+    return board if reading.has_room(board) else None
 
 
 def _heights(places: Sequence[float]) -> np.ndarray:

@@ -299,6 +299,15 @@ def test_a_bed_is_as_wide_both_ways():
     assert fitted("sofa", reading_of(boxes)).classes == ("bed", "sofa")
 
 
+@pytest.mark.parametrize(("along", "classes"), [(1, ("bed", "sofa")), (0, ("sofa", "bed"))])
+def test_a_thin_board_at_a_short_end_is_of_a_bed(along, classes):
+    board = [((-0.46, 1.0, 0.0), (0.46, 1.01, 1.0)), ((0.46, -1.0, 0.0), (0.47, 1.0, 1.0))][1 - along]
+    form = fitted("sofa", reading_of([((-0.46, -1.0, 0.0), (0.46, 1.0, 0.5)), board]))
+    assert form.classes == classes
+    (headboard,) = named(form, "headboard")
+    assert headboard.corners[:, 2].max() == pytest.approx(1.0, abs=0.02) and extents(headboard)[:2].min() < 0.1
+
+
 @pytest.mark.parametrize(
     ("family", "boxes", "why"),
     [

@@ -185,6 +185,12 @@ def test_nearest_wall_wins_whatever_the_order(build_graph):
     assert far.parent_link("wall_cabinet_3").because
 
 
+@pytest.mark.parametrize(("name", "parent"), [("wall_cabinet", "wall_1"), ("cabinet", "scene")])
+def test_a_wall_cabinet_of_which_the_front_was_seen_hangs_on_its_wall(build_graph, name, parent):
+    meshes = {1: box_mesh((2.0, -2, 0), (2.1, 2, 2.5)), 2: box_mesh((1.7, 0, 1.4), (1.75, 0.6, 1.9))}
+    assert parents(build_graph(meshes, {1: "wall", 2: name}))[f"{name}_2"][0] == parent
+
+
 def test_stray_vertices_do_not_stretch_the_box(build_graph):
     chair = box_mesh((-0.2, -0.2, 0), (0.2, 0.2, 0.9))
     leak = box_mesh((1.5, 1.5, 1.0), (1.52, 1.52, 1.05))
