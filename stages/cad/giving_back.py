@@ -62,4 +62,4 @@ def went(arranged: Arrangement, chosen: Mapping[str, Placement], name: str) -> n
 def given_back(entry: Shortlist, model_id: str, why: str) -> Shortlist:
     """Return the shortlist of a thing without a model: it keeps its mesh after all where no other is left."""
     left = tuple(placement for placement in entry.placements if placement.shape.model.id != model_id)
-    return replace(entry, placements=left, reason=f"{'' if left else 'no model: '}{why}")
+    return replace(entry, placements=left, reason=f"{'the next, as' if left else 'no model:'} {why}")

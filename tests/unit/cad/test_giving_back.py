@@ -61,5 +61,6 @@ def test_the_next_model_takes_the_place_of_one_that_goes():
     entry = Shortlist(None, tuple(map(placed, ("chair_1", "chair_2", "chair_1"))), {}, "")
     second = given_back(entry, "chair_1", "chair_1 would explain 30%")
     assert [placement.shape.model.id for placement in second.placements] == ["chair_2"]
+    assert second.reason == "the next, as chair_1 would explain 30%"
     last = given_back(second, "chair_2", "chair_2 would explain 40%")
     assert last.placements == () and last.reason == "no model: chair_2 would explain 40%"
