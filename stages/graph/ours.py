@@ -32,7 +32,6 @@ BOARD, SLENDER = 0.08, 0.25
 """Boards, posts and bars of furniture are thinner than this [m], and than this share of their length; by eye."""
 MOVABLE_REACH = 1 / 3
 """Movable things have to be this much nearer to a wall to hang on it."""
-
 HUNG, HUNG_DEPTH = frozenset({"wall_cabinet", "wall_shelf"}), 0.45
 """What has its name from its wall hangs there, if it is no farther away than such things are deep [m]: of some only
 the front is seen."""
@@ -88,8 +87,8 @@ class Ours:
                 choices = [*shared_candidates(child, entities, parameters), *choices]
             # A cup does not hang on the wall that the desk, which the map lacks, stands at.
             reach = parameters.wall_distance * (MOVABLE_REACH if child.movable else 1.0)
-            reach = max(reach, HUNG_DEPTH) if child.class_name in HUNG else reach
-            wall = wall_candidate(child, walls, reach, trees)
+            to_wall = max(reach, HUNG_DEPTH) if child.class_name in HUNG else reach
+            wall = wall_candidate(child, walls, to_wall, trees)
             hanging = hanging_candidate(child, ceilings, reach)
             held_up = [candidate for candidate in (wall, hanging) if candidate is not None]
             ranked[child.name] = [*choices, *sorted(held_up, key=lambda candidate: -candidate.score)]

@@ -189,6 +189,8 @@ def test_nearest_wall_wins_whatever_the_order(build_graph):
 def test_a_wall_cabinet_of_which_the_front_was_seen_hangs_on_its_wall(build_graph, name, parent):
     meshes = {1: box_mesh((2.0, -2, 0), (2.1, 2, 2.5)), 2: box_mesh((1.7, 0, 1.4), (1.75, 0.6, 1.9))}
     assert parents(build_graph(meshes, {1: "wall", 2: name}))[f"{name}_2"][0] == parent
+    over = {**meshes, 1: box_mesh((1.0, -1.0, 2.2), (2.4, 1.6, 2.3))}
+    assert parents(build_graph(over, {1: "ceiling", 2: name}))[f"{name}_2"][0] == "scene", "no ceiling is as near"
 
 
 def test_stray_vertices_do_not_stretch_the_box(build_graph):
