@@ -72,7 +72,11 @@ class CadParameters(Parameters):
     support_tolerance: float = Field(
         0.12, gt=0.0, description="Largest height difference of a child's old and new supporting surface [m]"
     )
-    wall_penetration: float = Field(0.15, ge=0.0, description="Maximum penetration of a wall [m]")
+    wall_penetration: float = Field(
+        0.15,
+        ge=0.0,
+        description="Maximum penetration of a wall [m]; ours: by parts and built-ins, as models are put before it",
+    )
     collision_tolerance: float = Field(0.015, ge=0.0, description="Penetration from which two things collide [m]")
     conflict_iterations: int = Field(50, ge=0, description="Most steps of min-conflicts")
     maximum_shift: float = Field(

@@ -1,4 +1,7 @@
-"""What a thing on one column stands on: the arms of a star that were seen, or the least foot that holds it."""
+"""What a thing on one column stands on: the arms of a star that were seen, or the least foot that holds it.
+
+Ours. Stars were seen on generated rooms alone.
+"""
 
 from __future__ import annotations
 
